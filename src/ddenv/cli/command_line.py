@@ -19,7 +19,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from ddenv import __version__
-from ddenv.cli.options import given_reading, reading_options, runs_and_scenarios
+from ddenv.cli.options import fetch_option, given_reading, reading_options, runs_and_scenarios
 from ddenv.cli.terminal import CANNOT_SAY, announce
 from ddenv.errors import UserError
 from ddenv.runs.folder import named
@@ -74,6 +74,7 @@ class Commands(click.Group):
 @click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__)
 @reading_options
+@fetch_option
 @click.pass_context
 def app(context: click.Context, /, **reading: Any) -> None:
     """Finds the few models of a world that make a robot fail. Without a command, or with a file or a run: the workbench.
@@ -83,8 +84,11 @@ def app(context: click.Context, /, **reading: Any) -> None:
     if context.invoked_subcommand is None:
         from ddenv.workbench.launch import run_workbench
 
+        if reading.pop("fetch"):
+            raise UserError("--fetch: name the world that lacks models; in the workbench, f beside them does the same")
         context.exit(run_workbench(reading=given_reading(reading)))
-    if any(reading.values()):
+    context.obj = reading
+    if any(reading.values()) and context.invoked_subcommand != "open":
         raise UserError(f"options for reading worlds go after the command: ddenv {context.invoked_subcommand} ...")
 
 

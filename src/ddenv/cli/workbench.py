@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,15 +25,18 @@ PORT = 8000
 @fetch_option
 @click.option("--watch", is_flag=True, help="Only watch: changes and writes nothing, not even beside RUN.")
 @click.option("--lines", is_flag=True, help="Plain lines that are never redrawn, for screen readers: type help.")
-def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
+@click.pass_obj
+def open_command(before: Mapping[str, Any], /, run: str, watch: bool, lines: bool, **reading: Any) -> int:
     """Attaches the workbench to a run (its name or file), or opens it on a scenario or an SDF world.
 
-    'ddenv RUN_OR_FILE' does the same.
+    'ddenv RUN_OR_FILE' does the same; options for reading worlds may also stand before RUN_OR_FILE.
     """
     from ddenv.runs.subject import reading_of, world_of
     from ddenv.workbench.launch import run_workbench
     from ddenv.world.access import is_folder
 
+    for name, value in before.items():
+        reading[name] = (*value, *reading[name]) if isinstance(value, tuple) else reading[name] or value
     kind, path = named(run) or ("run", find_run(run))
     if kind == "run" and path.is_file():
         if any(reading.values()):

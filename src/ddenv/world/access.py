@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import stat
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ddenv.errors import UserError
+from ddenv.settings import Ignorable
 from ddenv.world.tinyxml import Element, NotXml, parse_xml
 
 MAX_BYTES = 100_000_000  # of a file that the user names
@@ -54,11 +55,21 @@ class Unusable(Exception):
 
 
 class MissingFiles(UserError):
-    """Required files cannot be found; `uris` are all of them."""
+    """Required files cannot be used; `uris` are all of them, and `unreadable` says why for those that were found."""
 
-    def __init__(self, message: str, uris: Sequence[str]) -> None:
+    def __init__(self, message: str, uris: Sequence[str], unreadable: Mapping[str, str]) -> None:
         super().__init__(message)
         self.uris = tuple(uris)
+        self.unreadable = unreadable
+
+
+class Unsupported(UserError):
+    """An element of the kind `tag` is not supported, but can be left out; `name` says which one it is, and in which file."""
+
+    def __init__(self, message: str, tag: Ignorable, file: Path) -> None:
+        super().__init__(message)
+        self.tag = tag
+        self.name = f"<{tag}> in {file}"
 
 
 def read(path: Path, limit: int) -> bytes:

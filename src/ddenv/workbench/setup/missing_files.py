@@ -1,13 +1,13 @@
-"""What of a world is not as its file says: files that cannot be found, with the remedy of each, and parts that were replaced or
-ignored.
+"""What of a world is not as its file says: what cannot be used, with the remedy of each, and parts that were replaced or ignored.
 
-A remedy is a stand-in, `none`, or a folder, and is remembered by URI.
+The remedy of a file is a stand-in, `none`, or a folder, and is remembered by URI; one of Fuel can be fetched. An element that is
+not supported can only be left out, `none`.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -29,60 +29,80 @@ from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.setup.files import complaints
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.world.access import MissingFiles
+from ddenv.world.access import MissingFiles, Unsupported
 
 if TYPE_CHECKING:
     from ddenv.world.model import Note, World
     from ddenv.world.scenario import Reading
 
 OPEN, DONE = "?", "✓"
+MISSING, UNREADABLE, UNSUPPORTED = "missing file", "unreadable file", "unsupported element"
 HOW = """auto       a guessed shape
 none       without it
 /a/folder  the folder that holds its model's folder; tab completes
 box:x,y,z  or cylinder:radius,length, or sphere:radius (m)
 It is used in every world that names this file."""
+LEAVE = "not simulated; w leaves it out"
 
 
 @dataclass(frozen=True, slots=True)
 class Missing:
-    """A URI that cannot be found.
+    """A URI that cannot be used, or the name of an element that is not supported: its `kind` says which.
 
     Its `remedy` is a stand-in as for `--stand-in`, the absolute path of a folder, or "" for none yet. `words` say what stands on
-    the map for it, and first if it is not in the folder that was chosen for it.
+    the map for it, and first what is wrong with a file that was found, or if it is not in the folder that was chosen for it. Only
+    what is `in_fuel` can be fetched.
     """
 
     uri: str
     remedy: str
     words: str
+    kind: str = MISSING
+    in_fuel: bool = False
+
+
+def kinds(rows: Iterable[Missing]) -> str:
+    """How many of each kind there are, such as "2 missing files, 1 unsupported element"."""
+    return ", ".join(count(number, kind) for kind, number in Counter(row.kind for row in rows).items())
 
 
 def read_with_remedies(
     path: Path, reading: Reading, options: Mapping[str, Any]
 ) -> tuple[World, Data, tuple[Missing, ...]]:
-    """The world, with remembered remedies for what is missing, and a guess for all else; the `options` with these remedies.
+    """The world, with remembered remedies for what cannot be used, and a guess for all else; the `options` with these remedies.
 
     `reading` is the scenario's own, `options` are as on the command line. Raises UserError.
     """
     from ddenv.runs.subject import reading_of
+    from ddenv.world.files.resources import fuel_model
     from ddenv.world.sdf.read import read_world
     from ddenv.world.sdf.standin import AUTO
 
     known, found, vain = remembered(), dict[str, str](), dict[str, str]()
+    unreadable, elements = dict[str, str](), list[Missing]()
+    guesses: tuple[str, ...] = ()
     while True:
         chosen = with_remedies(options, found)
+        guessing = {**chosen, "stand_in": (*chosen.get("stand_in", ()), *guesses)}
         try:
-            world = read_world(path, reading_of(reading, **chosen))
+            world = read_world(path, reading_of(reading, **guessing))
             break
+        except Unsupported as error:
+            # Without the user's word it is left out on the map alone.
+            options = {**options, "ignore": (*options.get("ignore", ()), error.tag)}
+            text = known.get(error.name, "")
+            elements.append(Missing(error.name, text, "left out" if text else LEAVE, UNSUPPORTED))
+            # Behind it more files may be missing.
+            guesses = ()
         except MissingFiles as error:
+            unreadable |= error.unreadable
             # A folder does not help if the file is not in it.
             fresh = {uri: "" if uri in found else known.get(uri, "") for uri in error.uris}
             vain |= {uri: found[uri] for uri in error.uris if found.get(uri)}
             changed = {uri: text for uri, text in fresh.items() if found.get(uri, "") != text}
             found |= fresh
-        if not changed:
-            guessing = {**chosen, "stand_in": (*chosen.get("stand_in", ()), AUTO)}
-            world = read_world(path, reading_of(reading, **guessing))
-            break
+            if not changed:
+                guesses = (AUTO,)
     missing = []
     for uri, text in found.items():
         begin = f"'{uri}' by "
@@ -90,19 +110,29 @@ def read_with_remedies(
         words = f"in {text}" if text.startswith("/") else by.removeprefix("a guess, ").removeprefix("the stand-in ")
         if not text:
             words = f"not in {vain[uri]}; guess {words}" if uri in vain else f"guess {words}"
-        missing.append(Missing(uri, text, words))
-    return world, chosen, tuple(missing)
+        in_fuel = fuel_model(uri) is not None
+        if in_fuel and text in ("", AUTO):
+            words = f"f fetches it; {words}"
+        if uri in unreadable:
+            words = f"{unreadable[uri]}; {words}"
+        kind = UNREADABLE if uri in unreadable else MISSING
+        missing.append(Missing(uri, text, words, kind, in_fuel))
+    return world, chosen, (*missing, *elements)
 
 
 class MissingList(OptionList):
-    """A row for each missing file, then for each kind of part that was replaced or ignored; hidden while there is none."""
+    """A row for each file or element that cannot be used, then for each kind of part that was replaced or ignored; hidden while there is none."""
 
     BINDINGS: ClassVar = keys(
         "missing",
         ("choose", "enter", "select", "remedy", "choose a folder or a shape, or leave it out"),
         ("guess", "a", "guess", "guess", "take the guessed shape for all undecided files, or else for this one"),
         ("without", "w", "without", "without", "leave this one out"),
+        ("fetch", "f", "fetch", "fetch", "download what is missing from Gazebo Fuel; again: stop"),
     )
+
+    class Fetch(Message):
+        """The user wants what is missing from Fuel, or else no more of it."""
 
     @dataclass
     class Chosen(Message):
@@ -130,17 +160,19 @@ class MissingList(OptionList):
         self.highlighted = first if self.option_count else None
         self.display = self.option_count > 0
         self.set_class(not undecided, "-folded")
-        said = [f"{count(len(rows), 'missing file')} replaced"] if rows else []
+        said = [f"remedies for {kinds(rows)}"] if rows else []
         said += [f"{count(len(of_files), 'part')} replaced or ignored"] if of_files else []
         self.border_title = f"{', '.join(said)} (m)"
         if undecided:
-            self.border_title = f"{count(len(rows), 'file')} missing (m), {len(undecided)} without a remedy"
+            self.border_title = f"{kinds(rows)} (m), {len(undecided)} without a remedy"
 
     def _line(self, row: Missing) -> Text:
         color = self.app.theme_variables["text-success" if row.remedy else "text-warning"]
         text = Text(no_wrap=True, overflow="ellipsis").append(DONE if row.remedy else OPEN, f"bold {color}")
         # The last word of a URI tells models and meshes apart.
         name = plain(unquote(row.uri).rstrip("/").rsplit("/", 1)[-1]) or plain(row.uri)
+        if row.kind == UNSUPPORTED:
+            name = f"{row.uri.partition(' ')[0]} in {name}"
         return text.append(f" {name}  ").append(plain(row.words), "dim")
 
     @on(OptionList.OptionSelected)
@@ -149,6 +181,9 @@ class MissingList(OptionList):
         if event.option_index >= len(self._rows):
             return
         row = self._rows[event.option_index]
+        if row.kind == UNSUPPORTED:
+            self.post_message(self.Chosen({row.uri: "" if row.remedy else "none"}))
+            return
 
         def take(text: str | None) -> None:
             if text is not None:
@@ -157,19 +192,24 @@ class MissingList(OptionList):
         self.app.push_screen(AskRemedy(row), take)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        if action == "fetch":
+            return any(row.in_fuel and row.remedy in ("", "auto") for row in self._rows)
         return bool(self._rows) or action not in ("guess", "without")
 
     def action_guess(self) -> None:
-        undecided = [row.uri for row in self._rows if not row.remedy]
-        self.post_message(self.Chosen(dict.fromkeys(undecided or self._here, "auto")))
+        rows = [row for row in self._rows if not row.remedy] or self._here
+        self.post_message(self.Chosen({row.uri: "none" if row.kind == UNSUPPORTED else "auto" for row in rows}))
 
     def action_without(self) -> None:
-        self.post_message(self.Chosen(dict.fromkeys(self._here, "none")))
+        self.post_message(self.Chosen({row.uri: "none" for row in self._here}))
+
+    def action_fetch(self) -> None:
+        self.post_message(self.Fetch())
 
     @property
-    def _here(self) -> list[str]:
+    def _here(self) -> tuple[Missing, ...]:
         place = self.highlighted
-        return [] if place is None else [row.uri for row in self._rows[place : place + 1]]
+        return () if place is None else self._rows[place : place + 1]
 
 
 class AskRemedy(ModalScreen[str | None]):

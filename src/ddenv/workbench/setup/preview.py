@@ -21,12 +21,13 @@ from textual.worker import get_current_worker
 from ddenv.errors import UserError
 from ddenv.runs.folder import free_run_path, runs_folder
 from ddenv.runs.remedies import remember_remedies
-from ddenv.text import plain, shortened
+from ddenv.text import first_of, plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.place import Place, place_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice, read_choice
+from ddenv.workbench.setup.fetching import Download, start_download
 from ddenv.workbench.setup.fields import OptionsForm
 from ddenv.workbench.setup.files import remember
 from ddenv.workbench.setup.missing_files import MissingList
@@ -75,6 +76,8 @@ class Preview(Vertical):
         self.awaited = True
         self.past = Past()
         self.picked_next = ""
+        # What comes from Fuel just now.
+        self._download: Download | None = None
         # Whether the places in the form are of no scenario: another bare world keeps them.
         self._keeps_places = False
         # Where the robot has room, m, if it stands inside a model.
@@ -91,6 +94,7 @@ class Preview(Vertical):
 
     def on_mount(self) -> None:
         self.query_one("#start-notes").display = False
+        self._polling = self.set_interval(0.1, self._show_download, pause=True)
 
     def on_resize(self) -> None:
         self._show_picking()
@@ -106,6 +110,7 @@ class Preview(Vertical):
 
     def show_nothing(self, why: str) -> None:
         self.choice = None
+        self._stop_download()
         self.pick("")
         self.workers.cancel_group(self, "notes")
         self._show_about()
@@ -174,6 +179,36 @@ class Preview(Vertical):
         event.stop()
         if self.choice is not None:
             remember_remedies(event.remedies)
+            self._read(self.choice.path, False, again=True)
+
+    @on(MissingList.Fetch)
+    def _fetch_or_stop(self, event: MissingList.Fetch) -> None:
+        event.stop()
+        if self._download is not None:
+            self._stop_download()
+        elif self.choice is not None:
+            self._download = start_download(self.choice.settings.world, self.choice.settings.reading)
+            self._polling.resume()
+
+    def _stop_download(self) -> None:
+        if self._download is not None:
+            self._download.stopped = True
+
+    def _show_download(self) -> None:
+        """Shows how far it is. At its end the world is read again: some models may be there even if it failed."""
+        download = self._download
+        if download is None:
+            return
+        if not (download.ended or download.stopped):
+            self.missing.border_title = Text(plain(f"{download.words}; f stops"))
+            return
+        self._download = None
+        self._polling.pause()
+        if download.fetched:
+            self.notify(plain(first_of(download.fetched, 1)), timeout=8, markup=False)
+        if download.error:
+            self.notify(plain(download.error), severity="error", timeout=12, markup=False)
+        if self.choice is not None:
             self._read(self.choice.path, False, again=True)
 
     @property

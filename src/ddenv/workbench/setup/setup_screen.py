@@ -18,7 +18,7 @@ from textual.widget import Widget
 from textual.widgets import Button, Input, OptionList, Static
 
 from ddenv.errors import UserError
-from ddenv.text import Names, count, plain
+from ddenv.text import Names, plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.runs_table import RunList
@@ -26,6 +26,7 @@ from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.fields import OptionsForm
 from ddenv.workbench.setup.files import FileList, OpenFile, SaveScenario, recent_files
+from ddenv.workbench.setup.missing_files import kinds
 from ddenv.workbench.setup.preview import Preview
 from ddenv.workbench.setup.start_run import NO_COMMAND, command_words, create, run_file, whole_cost
 from ddenv.workbench.shared.background import call_if_open
@@ -76,7 +77,7 @@ class SetupScreen(Screen[None]):
         ("pick_start", "s", "pick('start')", "start", "set the start on the map"),
         ("pick_heading", "h", "pick('heading')", "heading", "set the heading on the map"),
         ("pick_goal", "g", "pick('goal')", "goal", "set the goal on the map"),
-        ("missing", "m", "missing", "missing", "to the missing files and their remedies"),
+        ("missing", "m", "missing", "missing", "to what cannot be used, such as missing files, and its remedies"),
         *MAP_KEYS,
         ("choose", "f2", "pane('choose')", "choose", "to the scenarios, worlds and runs"),
         ("map", "f3", "pane('map')", "map", "to the map"),
@@ -227,8 +228,8 @@ class SetupScreen(Screen[None]):
             awaited = "the world is still being read: try again in a moment"
             raise UserError(awaited if self.preview.awaited else "choose a scenario or a world that can be read")
         # A guess is shown, but only run with if the user takes it.
-        if undecided := sum(not each.remedy for each in choice.missing):
-            raise UserError(f"{count(undecided, 'missing file')} without a remedy: press m")
+        if undecided := [each for each in choice.missing if not each.remedy]:
+            raise UserError(f"{kinds(undecided)} without a remedy: press m")
         return choice, form.asked_of(choice.settings, self.form.texts, pair, algorithm)
 
     def _command(self, choice: Choice, scenario: Scenario) -> list[str]:

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 from ddenv.errors import UserError
-from ddenv.world.access import MissingFiles
+from ddenv.settings import Ignorable
+from ddenv.world.access import MissingFiles, Unsupported
 from ddenv.world.files.resources import Resources, how_to_fetch
 from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading
@@ -78,7 +79,7 @@ class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
 
     `used` are the URIs of stand-ins that were asked for, `missing` the first errors of missing files by URI, which one message
-    lists, `unreadable` those of these that were found, `files` the parsed files, `guessed` what has a guessed shape: the model,
+    lists, `unreadable` why those of these that were found cannot be used, `files` the parsed files, `guessed` what has a guessed shape: the model,
     and the URI.
     """
 
@@ -90,7 +91,7 @@ class Context:
     used: set[str] = field(default_factory=set)
     assembled: int = 0
     missing: dict[str, UserError] = field(default_factory=dict)
-    unreadable: set[str] = field(default_factory=set)
+    unreadable: dict[str, str] = field(default_factory=dict)
     files: dict[Path, Element] = field(default_factory=dict)
     guessed: list[tuple[str, str]] = field(default_factory=list)
 
@@ -123,7 +124,8 @@ class Context:
         first, *others = self.missing
         absent = _also("missing", [uri for uri in others if uri not in self.unreadable])
         broken = _also("unreadable", [uri for uri in others if uri in self.unreadable])
-        raise MissingFiles(f"{self.missing[first]}{absent}{broken}{how_to_fetch(self.missing)}", list(self.missing))
+        message = f"{self.missing[first]}{absent}{broken}{how_to_fetch(self.missing)}"
+        raise MissingFiles(message, list(self.missing), self.unreadable)
 
     def ignores(self, tag: str) -> bool:
         return tag in self.reading.ignore
@@ -196,9 +198,10 @@ def version(element: Element) -> tuple[int, int]:
     return int(major), int(minor)
 
 
-def refuse(element: Element, message: str) -> UserError:
+def refuse(element: Element, tag: Ignorable, message: str) -> UserError:
     """The error for an element that is not supported but can be left out with `--ignore`."""
-    return complain(element, f"{message}; leave it out with --ignore {element.tag}")
+    words = f"{place(element)}: {message}; leave it out with --ignore {tag}"
+    return Unsupported(words, tag, element.source)
 
 
 def note_unread(element: Element, context: Context) -> None:

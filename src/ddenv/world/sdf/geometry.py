@@ -82,7 +82,7 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
         case "heightmap" | "image" as tag:
             seen = parent.tag == "visual"
             if not seen and not context.ignores(tag):
-                raise refuse(element, f"a {tag} is not supported: nothing would collide with it")
+                raise refuse(element, tag, f"a {tag} is not supported: nothing would collide with it")
             why = f"a {tag} is not drawn" if seen else "left out by --ignore: nothing collides with it"
             context.note("ignored", element, why)
             return None

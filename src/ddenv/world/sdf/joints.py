@@ -59,7 +59,7 @@ def read_joints(spot: Spot, links: dict[str, LinkPose], context: Context) -> lis
         elif context.ignores("joint"):
             context.note("ignored", element, f"a '{kind}' joint is left out by --ignore: its links move freely")
         else:
-            raise refuse(element, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
+            raise refuse(element, "joint", f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
     return joints
 
 

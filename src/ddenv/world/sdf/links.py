@@ -125,7 +125,7 @@ def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -
         return None
     kinds = {other.element.tag for other in items if isinstance(other.shape, Placed)}
     if lost.unreadable:
-        context.unreadable.add(lost.uri)
+        context.unreadable[lost.uri] = lost.reason
     context.missing.setdefault(lost.uri, complain(lost.element, remedies(lost, tuple(sorted(kinds)))))
     return None
 
