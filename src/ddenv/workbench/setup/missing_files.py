@@ -121,7 +121,10 @@ def read_with_remedies(
 
 
 class MissingList(OptionList):
-    """A row for each file or element that cannot be used, then for each kind of part that was replaced or ignored; hidden while there is none."""
+    """A row for each file or element that cannot be used, then for each kind of part that was replaced or ignored.
+
+    It is hidden while there is none.
+    """
 
     BINDINGS: ClassVar = keys(
         "missing",

@@ -79,8 +79,8 @@ class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
 
     `used` are the URIs of stand-ins that were asked for, `missing` the first errors of missing files by URI, which one message
-    lists, `unreadable` why those of these that were found cannot be used, `files` the parsed files, `guessed` what has a guessed shape: the model,
-    and the URI.
+    lists, `unreadable` why those of these that were found cannot be used, `files` the parsed files, `guessed` what has a guessed
+    shape: the model, and the URI.
     """
 
     resources: Resources
@@ -122,8 +122,8 @@ class Context:
         if not self.missing:
             return
         first, *others = self.missing
-        absent = _also("missing", [uri for uri in others if uri not in self.unreadable])
-        broken = _also("unreadable", [uri for uri in others if uri in self.unreadable])
+        absent = _also("also missing", [uri for uri in others if uri not in self.unreadable])
+        broken = _also("also unreadable", [uri for uri in others if uri in self.unreadable])
         message = f"{self.missing[first]}{absent}{broken}{how_to_fetch(self.missing)}"
         raise MissingFiles(message, list(self.missing), self.unreadable)
 
@@ -147,7 +147,7 @@ class Context:
 def _also(what: str, uris: Sequence[str]) -> str:
     """The end of a sentence that names other files."""
     more = f" and {len(uris) - 5} more" if len(uris) > 5 else ""
-    return f"; also {what}: {', '.join(repr(uri[:100]) for uri in uris[:5])}{more}" if uris else ""
+    return f"; {what}: {', '.join(repr(uri[:100]) for uri in uris[:5])}{more}" if uris else ""
 
 
 def sdf_root(text: bytes, path: Path) -> Element:
