@@ -305,7 +305,7 @@ def test_a_malformed_world_is_told_with_its_line(home, command):
     data["world"] = "w.sdf"
     data["robot"]["model"] = str(DATA.parents[1] / "sdf" / "robots" / "husky.sdf")
     (home / "s.yaml").write_text(yaml.safe_dump(data))
-    is_one_line(command("run", home / "s.yaml"), "w.sdf:4: not well-formed XML")
+    is_one_line(command("run", home / "s.yaml"), "w.sdf:4:1: not well-formed XML")
 
 
 def test_a_newer_run_file_is_refused(reduced, tmp_path, command):

@@ -64,12 +64,12 @@ class MissingFiles(UserError):
 
 
 class Unsupported(UserError):
-    """An element of the kind `tag` is not supported, but can be left out; `name` says which one it is, and in which file."""
+    """An element of the kind `tag` is not supported, but can be left out; `name` says in which file."""
 
     def __init__(self, message: str, tag: Ignorable, file: Path) -> None:
         super().__init__(message)
         self.tag = tag
-        self.name = f"<{tag}> in {file}"
+        self.name = f"{file}/<{tag}>"
 
 
 def read(path: Path, limit: int) -> bytes:

@@ -79,8 +79,8 @@ class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
 
     `used` are the URIs of stand-ins that were asked for, `missing` the first errors of missing files by URI, which one message
-    lists, `unreadable` why those of these that were found cannot be used, `files` the parsed files, `guessed` what has a guessed shape: the model,
-    and the URI.
+    lists, `unreadable` why those of these that were found cannot be used, `files` the parsed files, `guessed` what has a guessed
+    shape: the model, and the URI.
     """
 
     resources: Resources
