@@ -44,8 +44,7 @@ def missing_models(world: Path, reading: Reading) -> dict[FuelModel, str]:
     """
     resources = disk_of(world, reading)
     parse_world(read_bytes(world), world, reading, resources)
-    named = [(fuel_model(uri), uri) for uri in resources.absent()]
-    return {model: uri for model, uri in named if model is not None}
+    return {model: uri for uri in resources.absent() if (model := fuel_model(uri))}
 
 
 def _words(folder: Path, archive: Archive | None) -> str:

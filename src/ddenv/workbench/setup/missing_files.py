@@ -50,14 +50,12 @@ class Missing:
 
     Its `remedy` is a stand-in as for `--stand-in`, the absolute path of a folder, or "" for none yet. `words` say what stands on
     the map for it, and first what is wrong with a file that was found, or if it is not in the folder that was chosen for it.
-    `in_fuel`: it can be fetched.
     """
 
     uri: str
     remedy: str
     words: str
     kind: str = MISSING
-    in_fuel: bool = False
 
 
 def kinds(rows: Iterable[Missing]) -> str:
@@ -78,14 +76,14 @@ def read_with_remedies(
     from ddenv.world.sdf.standin import AUTO
 
     known, found, vain = remembered(), dict[str, str](), dict[str, str]()
-    unreadable = dict[str, str]()
+    wrong = dict[str, str]()
     while True:
         chosen = with_remedies(options, found)
         try:
             world = read_world(path, reading_of(reading, **chosen))
             break
         except MissingFiles as error:
-            unreadable |= error.unreadable
+            wrong |= error.uris
             # A folder does not help if the file is not in it.
             fresh = {uri: "" if uri in found else known.get(uri, "") for uri in error.uris}
             vain |= {uri: found[uri] for uri in error.uris if found.get(uri)}
@@ -102,10 +100,13 @@ def read_with_remedies(
         words = f"in {text}" if text.startswith("/") else by.removeprefix("a guess, ").removeprefix("the stand-in ")
         if not text:
             words = f"not in {vain[uri]}; guess {words}" if uri in vain else f"guess {words}"
-        in_fuel = text in ("", AUTO) and fuel_model(uri) is not None
-        why = unreadable.get(uri) or ("f fetches it" if in_fuel else "")
-        words = f"{why}; {words}" if why else words
-        missing.append(Missing(uri, text, words, UNREADABLE if uri in unreadable else MISSING, in_fuel))
+        kind = MISSING
+        if why := wrong[uri]:
+            words = f"{why}; {words}"
+            kind = UNREADABLE
+        elif fuel_model(uri) and text in ("", AUTO):
+            words = f"f fetches it; {words}"
+        missing.append(Missing(uri, text, words, kind))
     return world, chosen, tuple(missing)
 
 
@@ -120,11 +121,7 @@ class MissingList(OptionList):
         ("choose", "enter", "select", "remedy", "choose a folder or a shape, or leave it out"),
         ("guess", "a", "guess", "guess", "take the guessed shape for all undecided files, or else for this one"),
         ("without", "w", "without", "without", "leave this one out"),
-        ("fetch", "f", "fetch", "fetch", "download what is missing from Gazebo Fuel; again: stop"),
     )
-
-    class Fetch(Message):
-        """The user wants what is missing from Fuel, or else no more of it."""
 
     @dataclass
     class Chosen(Message):
@@ -182,8 +179,6 @@ class MissingList(OptionList):
         self.app.push_screen(AskRemedy(row), take)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        if action == "fetch":
-            return any(row.in_fuel for row in self._rows)
         return bool(self._rows) or action not in ("guess", "without")
 
     def action_guess(self) -> None:
@@ -192,9 +187,6 @@ class MissingList(OptionList):
 
     def action_without(self) -> None:
         self.post_message(self.Chosen(dict.fromkeys(self._here, "none")))
-
-    def action_fetch(self) -> None:
-        self.post_message(self.Fetch())
 
     @property
     def _here(self) -> list[str]:

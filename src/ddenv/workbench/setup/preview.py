@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
-from threading import Event, Thread
-from typing import TYPE_CHECKING, Any
+from threading import Thread, current_thread
+from typing import Any, ClassVar
 
 from rich.text import Text
 from textual import on, work
@@ -34,9 +34,7 @@ from ddenv.workbench.setup.files import remember
 from ddenv.workbench.setup.missing_files import MissingList
 from ddenv.workbench.setup.start_run import Past, past_of
 from ddenv.workbench.shared.background import call_if_open
-
-if TYPE_CHECKING:
-    from ddenv.world.scenario import Scenario
+from ddenv.workbench.shared.bindings import keys
 
 # What to do about each kind of note; it comes first, since the end of a line may not fit.
 REMEDIES = {
@@ -60,6 +58,11 @@ class Preview(Vertical):
     are in the form, which it fills in. `past` is what earlier runs of the choice say of its cost.
     """
 
+    BINDINGS: ClassVar = keys(
+        "missing",
+        ("fetch", "f", "fetch", "fetch", "download what is missing from Gazebo Fuel; again: stop"),
+    )
+
     @dataclass
     class Read(Message):
         """The choice was read; or it cannot be read, and the map says why. `opened`: the user opened its file just now."""
@@ -79,8 +82,8 @@ class Preview(Vertical):
         self.awaited = True
         self.past = Past()
         self.picked_next = ""
-        # Set while models come from Fuel.
-        self._fetching = Event()
+        # While models come from Fuel.
+        self._fetching: Thread | None = None
         # Whether the places in the form are of no scenario: another bare world keeps them.
         self._keeps_places = False
         # Where the robot has room, m, if it stands inside a model.
@@ -99,7 +102,7 @@ class Preview(Vertical):
         self.query_one("#start-notes").display = False
 
     def on_unmount(self) -> None:
-        self._fetching.clear()
+        self._fetching = None
 
     def on_resize(self) -> None:
         self._show_picking()
@@ -115,7 +118,6 @@ class Preview(Vertical):
 
     def show_nothing(self, why: str) -> None:
         self.choice = None
-        self._fetching.clear()
         self.pick("")
         self.workers.cancel_group(self, "notes")
         self._show_about()
@@ -186,28 +188,28 @@ class Preview(Vertical):
 
     def _read_again(self) -> None:
         """Reads the world with other remedies or files; until then the map stays."""
-        if self.choice is not None:
+        if self.choice:
             self._read(self.choice.path, False, again=True)
 
-    @on(MissingList.Fetch)
-    def _fetch_or_stop(self, event: MissingList.Fetch) -> None:
-        event.stop()
-        if self._fetching.is_set():
-            self._fetching.clear()
+    def action_fetch(self) -> None:
+        if self._fetching:
+            self._fetching = None
             self._read_again()
-        elif self.choice is not None:
-            self._fetching = Event()
-            self._fetching.set()
+        elif self.choice:
             # Where a server hangs, this thread does not hold up the end of the workbench.
-            Thread(target=self._fetch, args=(self._fetching, self.choice.settings), daemon=True).start()
+            self._fetching = Thread(target=self._fetch, args=(self.choice,), daemon=True)
+            self._fetching.start()
 
-    def _fetch(self, wanted: Event, scenario: Scenario) -> None:
-        """Downloads from Fuel what a world lacks, as long as that is `wanted`."""
+    def _fetch(self, choice: Choice) -> None:
+        """Downloads from Fuel what a world lacks; the user may look at others meanwhile."""
         from ddenv.runs.fetching import fetch_missing
 
+        needs = choice.settings
+
         def arrived(name: str, received: int, total: int | None) -> None:
-            if not wanted.is_set():
-                raise UserError("stopped")
+            if self._fetching is not current_thread():
+                # Ends the thread, and leaves nothing behind.
+                raise SystemExit
             whole = f" of {total / 1e6:.1f}" if total else ""
             words = Text(plain(f"{name}: {received / 1e6:.1f}{whole} MB; f stops"))
             call_if_open(self, setattr, self.missing, "border_title", words)
@@ -216,10 +218,10 @@ class Preview(Vertical):
             call_if_open(self, partial(self.notify, timeout=10, markup=False), plain(words))
 
         try:
-            fetch_missing(scenario.world, scenario.reading, lambda model: partial(arrived, model.name), tell)
+            fetch_missing(needs.world, needs.reading, lambda model: partial(arrived, model.name), tell)
         except UserError as error:
             tell(str(error))
-        wanted.clear()
+        self._fetching = None
         call_if_open(self, self._read_again)
 
     @property

@@ -59,7 +59,9 @@ def included(include: Element, files: tuple[Path, ...], context: Context) -> Par
     merged = (include.get("merge") or "").strip().lower() in ("true", "1")
     if merged and (include.parent is None or include.parent.tag != "model"):
         if not context.ignores("include"):
-            raise refuse(include, "include", "merge='true' puts the links of a model into the model around it; here is none")
+            raise refuse(
+                include, "include", "merge='true' puts the links of a model into the model around it; here is none"
+            )
         context.note("ignored", include, "merge='true' outside of a model: left out by --ignore include")
         return None
     root = _root(include, uri, context)
