@@ -36,7 +36,7 @@ def open_command(before: Mapping[str, Any], /, run: str, watch: bool, lines: boo
     from ddenv.world.access import is_folder
 
     for name, value in before.items():
-        reading[name] = (*value, *reading[name]) if isinstance(value, tuple) else reading[name] or value
+        reading[name] = value + reading[name] if isinstance(value, tuple) else reading[name] or value
     kind, path = named(run) or ("run", find_run(run))
     if kind == "run" and path.is_file():
         if any(reading.values()):

@@ -20,7 +20,7 @@ from ddenv.runs.remembered import state_file
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put, read
 from ddenv.text import Data, Names, first_of, shortened
-from ddenv.world.access import MissingFiles, Unsupported, is_read_as_world, read_bytes, resolved, write_file
+from ddenv.world.access import MissingFiles, is_read_as_world, read_bytes, resolved, write_file
 from ddenv.world.command import command_words
 from ddenv.world.files.resources import Resources
 from ddenv.world.load import SDF, find_scenario, load_scenario, validate
@@ -143,12 +143,11 @@ def reading_of(
 
 
 def with_remembered(world: Path, reading: Reading, announce: Announce | None = None) -> Reading:
-    """How to read a world, with the remedies that the user chose for what cannot be used in it; it says which these are.
+    """How to read a world, with the remedies that the user chose for files which it lacks; it says which these are.
 
     Whatever else is wrong with the world shows when it is read.
     """
-    known, read_as = remembered(), reading
-    found, parts = dict[str, str](), dict[str, str]()
+    known, found, read_as = remembered(), dict[str, str](), reading
     while known:
         read_as = reading_of(reading, **with_remedies({}, found))
         try:
@@ -159,18 +158,12 @@ def with_remembered(world: Path, reading: Reading, announce: Announce | None = N
             if not fresh:
                 break
             found |= fresh
-        except Unsupported as error:
-            if error.name not in known:
-                break
-            reading = reading_of(reading, ignore=[error.tag])
-            parts[error.name] = known[error.name]
         except UserError:
             break
-    chosen = found | parts
-    if chosen and announce is not None:
-        names = first_of([f"{shortened(uri, LONGEST)} ({text})" for uri, text in chosen.items()], NAMED)
+    if found and announce is not None:
+        names = first_of([f"{shortened(uri, LONGEST)} ({text})" for uri, text in found.items()], NAMED)
         announce(f"uses what you chose for {names}; {state_file(REMEDIES)} keeps that, --no-remembered leaves it out")
-    return read_as
+    return read_as if found else reading
 
 
 def without_guesses_at_start(scenario: Scenario, announce: Announce | None = None) -> Scenario:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from ddenv.errors import UserError
@@ -55,21 +55,20 @@ class Unusable(Exception):
 
 
 class MissingFiles(UserError):
-    """Required files cannot be used; `uris` are all of them, and `unreadable` says why for those that were found."""
+    """Required files cannot be used; `uris` are all of them, with the reason for those that were found, else empty."""
 
-    def __init__(self, message: str, uris: Sequence[str], unreadable: Mapping[str, str]) -> None:
+    def __init__(self, message: str, uris: Mapping[str, str]) -> None:
         super().__init__(message)
-        self.uris = tuple(uris)
-        self.unreadable = unreadable
+        self.uris = uris
 
 
 class Unsupported(UserError):
-    """An element of the kind `tag` is not supported, but can be left out; `name` says which one it is, and in which file."""
+    """An element of the kind `tag` is not supported, but can be left out; `name` says in which file."""
 
     def __init__(self, message: str, tag: Ignorable, file: Path) -> None:
         super().__init__(message)
         self.tag = tag
-        self.name = f"<{tag}> in {file}"
+        self.name = f"{file}/<{tag}>"
 
 
 def read(path: Path, limit: int) -> bytes:

@@ -2,17 +2,22 @@
 
 import json
 import shlex
+import threading
 from pathlib import Path
 
 import pytest
 from textual.widgets import Input
 
 from ddenv.errors import UserError
+from ddenv.runs import fetching
 from ddenv.runs.remedies import KEPT, REMEDIES, remedy, remember_remedies, remembered
 from ddenv.runs.remembered import state_file
 from ddenv.runs.subject import load_parts, scenario_named
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup.missing_files import AskRemedy, MissingList
+from ddenv.world.access import Unusable
+from ddenv.world.files.fuel import CACHES, HOSTS
+from ddenv.world.files.fuel_download import Archive
 from ddenv.world.model import Box, Cylinder
 from tests.command import in_process, is_one_line
 from tests.workbench.setup.setup_session import Opened
@@ -99,6 +104,107 @@ async def test_missing_files_are_rows_with_a_guess_that_is_on_the_map(depot, sta
         assert world.model("one").collisions == ()
 
 
+def collision(shape):
+    return f"<collision name='c'><geometry>{shape}</geometry></collision>"
+
+
+async def test_elements_that_are_not_supported_are_left_out_once_the_user_says_so(tmp_path):
+    hill = f"<model name='hill'><static>1</static><link name='l'>{collision('<heightmap/>')}</link></model>"
+    hinge = "<joint name='j' type='rope'><parent>l</parent><child>m</child></joint>"
+    cart = f"<model name='cart'><link name='l'>{collision('<box><size>1 1 1</size></box>')}</link><link name='m'/>"
+    models = f"<include><uri>{SHELF}</uri></include>{hill}{barrel('one', 4)}{cart}{hinge}</model>"
+    path = tmp_path / "hills.world"
+    path.write_text(f"<sdf version='1.6'><world name='w'>{models}</world></sdf>")
+    async with Opened(size=(80, 24)) as session:
+        await session.open(path)
+        assert [row.partition("  ")[0] for row in rows(session)] == [
+            "? old_shelf",
+            "? barrel.dae",
+            "? <joint>",
+            "? <heightmap>",
+        ]
+        assert "2 missing files, 2 unsupported elements without a remedy: press m" in session.told("cost")
+        await session.press("m", "home", "down", "down", "enter")
+        assert rows(session)[2:] == ["✓ <joint>  left out", "? <heightmap>  left out"]
+        await session.press("m", "a")
+        assert [row[0] for row in rows(session)] == ["✓"] * 4
+        await session.place(spawn_x="0", goal_x="8")
+        assert "--ignore heightmap --ignore joint" in session.told("command")
+        # In another world it may be the ground.
+        other = tmp_path / "other.world"
+        other.write_bytes(path.read_bytes())
+        await session.open(other)
+        assert [row[0] for row in rows(session)] == ["✓", "✓", "?", "?"]
+
+
+async def test_a_file_that_was_found_and_cannot_be_used_says_why(tmp_path):
+    (tmp_path / "barrel.dae").write_text("<COLLADA><")
+    path = tmp_path / "w.sdf"
+    path.write_text(
+        f"<sdf version='1.6'><world name='w'>{barrel('one', 2).replace(BARREL, 'barrel.dae')}</world></sdf>"
+    )
+    async with Opened() as session:
+        await session.open(path)
+        assert session.screen.query_one(MissingList).border_title == "1 unreadable file (m), 1 without a remedy"
+        assert rows(session)[0].startswith("? barrel.dae  is not a valid DAE file: line 1, column 10: ")
+
+
+CRATE = (
+    f"<model name='crate'><static>1</static><link name='l'>{collision('<box><size>2 1 1</size></box>')}</link></model>"
+)
+
+
+@pytest.mark.filterwarnings("ignore:Exception in thread:pytest.PytestUnhandledThreadExceptionWarning")
+async def test_models_come_from_fuel_unless_the_user_stops_that(depot, tmp_path, monkeypatch):
+    for variable in CACHES:
+        monkeypatch.delenv(variable, raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    answer, ends = threading.Event(), []
+
+    def download(model, shown):
+        shown(1_200_000, 5_000_000)
+        answer.wait(60)
+        ends.append("stopped")
+        shown(5_000_000, 5_000_000)
+        ends[-1] = "came"
+        if model.name == "Lamp":
+            raise Unusable("is not in Fuel")
+        folder = tmp_path / "home" / ".gz" / "fuel" / HOSTS[0] / model.folder / "3"
+        folder.mkdir(parents=True)
+        (folder / "model.sdf").write_text(f"<sdf version='1.6'>{CRATE}</sdf>")
+        return folder, Archive(model.url, "3", 5_000_000, "0" * 64)
+
+    monkeypatch.setattr(fetching, "download", download)
+    uris = [f"https://{HOSTS[0]}/1.0/Some One/models/{name}" for name in ("Crate", "Lamp")]
+    includes = "".join(f"<include><uri>{uri}</uri></include>" for uri in uris)
+    depot.write_text(depot.read_text().replace("</world>", f"{includes}</world>"))
+    async with Opened() as session:
+
+        async def until(holds):
+            while not holds():
+                await session.pilot.pause(0.02)
+            await session.settle()
+
+        await session.open(depot)
+        found = session.screen.query_one(MissingList)
+        assert rows(session)[1].startswith("? Crate  f fetches it; guess box")
+        await session.press("m", "f")
+        await until(lambda: found.border_title == "Crate: 1.2 of 5.0 MB; f stops")
+        await session.press("f")
+        # At once, though the server sends nothing.
+        await until(lambda: found.border_title == "4 missing files (m), 4 without a remedy")
+        answer.set()
+        await until(lambda: ends == ["stopped"])
+        await session.press("f")
+        await until(lambda: len(rows(session)) == 3)
+        assert ends == ["stopped", "came", "came"]
+        assert shape(session, "crate") == Box((2, 1, 1))
+        (failed,) = [each.message for each in session.app._notifications]
+        assert "Lamp cannot be fetched: is not in Fuel" in failed
+        await session.press("m", "home", "down", "w")
+        assert rows(session)[1] == "✓ Lamp  left out"
+
+
 @pytest.mark.screens
 async def test_remedies_are_used_the_next_time_and_in_other_worlds(depot, tmp_path):
     async with Opened() as session:
@@ -109,7 +215,7 @@ async def test_remedies_are_used_the_next_time_and_in_other_worlds(depot, tmp_pa
         # What is solved is a line until one wants to read it.
         found = session.screen.query_one(MissingList)
         assert (found.border_title.split(",")[0].removesuffix(" (m)"), found.size.height) == (
-            "2 missing files replaced",
+            "remedies for 2 missing files",
             0,
         )
         await session.press("m")

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
+from ddenv.runs.remedies import remembered
 from ddenv.text import plain
-from ddenv.workbench.setup.missing_files import Missing, read_with_remedies
-from ddenv.world.access import is_read_as_world
+from ddenv.workbench.setup.missing_files import UNSUPPORTED, Missing, read_with_remedies
+from ddenv.world.access import Unsupported, is_read_as_world
 
 if TYPE_CHECKING:
     from ddenv.world.model import Model, World
@@ -128,6 +129,12 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
         return Choice(path, world, scenario, run=True)
     bare = is_read_as_world(path)
     settings = scenario_for_world(path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0)) if bare else load_scenario(path)
-    world, chosen, missing = read_with_remedies(settings.world, settings.reading, options)
+    try:
+        world, chosen, missing = read_with_remedies(settings.world, settings.reading, options)
+    except Unsupported as error:
+        # Without the user's word it is left out on the map alone.
+        choice = read_choice(path, {**options, "ignore": (*options.get("ignore", ()), error.tag)})
+        element = Missing(error.name, remembered().get(error.name, ""), "left out", UNSUPPORTED)
+        return replace(choice, missing=(*choice.missing, element))
     settings = settings.model_copy(update={"reading": reading_of(settings.reading, **chosen)})
     return Choice(path, world, settings, bare, options=chosen, missing=missing)

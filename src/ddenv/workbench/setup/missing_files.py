@@ -29,7 +29,7 @@ from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.setup.files import complaints
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.world.access import MissingFiles, Unsupported
+from ddenv.world.access import MissingFiles
 
 if TYPE_CHECKING:
     from ddenv.world.model import Note, World
@@ -42,7 +42,6 @@ none       without it
 /a/folder  the folder that holds its model's folder; tab completes
 box:x,y,z  or cylinder:radius,length, or sphere:radius (m)
 It is used in every world that names this file."""
-LEAVE = "not simulated; w leaves it out"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,15 +49,13 @@ class Missing:
     """A URI that cannot be used, or the name of an element that is not supported: its `kind` says which.
 
     Its `remedy` is a stand-in as for `--stand-in`, the absolute path of a folder, or "" for none yet. `words` say what stands on
-    the map for it, and first what is wrong with a file that was found, or if it is not in the folder that was chosen for it. Only
-    what is `in_fuel` can be fetched.
+    the map for it, and first what is wrong with a file that was found, or if it is not in the folder that was chosen for it.
     """
 
     uri: str
     remedy: str
     words: str
     kind: str = MISSING
-    in_fuel: bool = False
 
 
 def kinds(rows: Iterable[Missing]) -> str:
@@ -71,7 +68,7 @@ def read_with_remedies(
 ) -> tuple[World, Data, tuple[Missing, ...]]:
     """The world, with remembered remedies for what cannot be used, and a guess for all else; the `options` with these remedies.
 
-    `reading` is the scenario's own, `options` are as on the command line. Raises UserError.
+    `reading` is the scenario's own, `options` are as on the command line. Raises Unsupported, and UserError.
     """
     from ddenv.runs.subject import reading_of
     from ddenv.world.files.resources import fuel_model
@@ -79,30 +76,23 @@ def read_with_remedies(
     from ddenv.world.sdf.standin import AUTO
 
     known, found, vain = remembered(), dict[str, str](), dict[str, str]()
-    unreadable, elements = dict[str, str](), list[Missing]()
-    guesses: tuple[str, ...] = ()
+    wrong = dict[str, str]()
     while True:
         chosen = with_remedies(options, found)
-        guessing = {**chosen, "stand_in": (*chosen.get("stand_in", ()), *guesses)}
         try:
-            world = read_world(path, reading_of(reading, **guessing))
+            world = read_world(path, reading_of(reading, **chosen))
             break
-        except Unsupported as error:
-            # Without the user's word it is left out on the map alone.
-            options = {**options, "ignore": (*options.get("ignore", ()), error.tag)}
-            text = known.get(error.name, "")
-            elements.append(Missing(error.name, text, "left out" if text else LEAVE, UNSUPPORTED))
-            # Behind it more files may be missing.
-            guesses = ()
         except MissingFiles as error:
-            unreadable |= error.unreadable
+            wrong |= error.uris
             # A folder does not help if the file is not in it.
             fresh = {uri: "" if uri in found else known.get(uri, "") for uri in error.uris}
             vain |= {uri: found[uri] for uri in error.uris if found.get(uri)}
             changed = {uri: text for uri, text in fresh.items() if found.get(uri, "") != text}
             found |= fresh
-            if not changed:
-                guesses = (AUTO,)
+        if not changed:
+            guessing = {**chosen, "stand_in": (*chosen.get("stand_in", ()), AUTO)}
+            world = read_world(path, reading_of(reading, **guessing))
+            break
     missing = []
     for uri, text in found.items():
         begin = f"'{uri}' by "
@@ -110,14 +100,14 @@ def read_with_remedies(
         words = f"in {text}" if text.startswith("/") else by.removeprefix("a guess, ").removeprefix("the stand-in ")
         if not text:
             words = f"not in {vain[uri]}; guess {words}" if uri in vain else f"guess {words}"
-        in_fuel = fuel_model(uri) is not None
-        if in_fuel and text in ("", AUTO):
+        kind = MISSING
+        if why := wrong[uri]:
+            words = f"{why}; {words}"
+            kind = UNREADABLE
+        elif fuel_model(uri) and text in ("", AUTO):
             words = f"f fetches it; {words}"
-        if uri in unreadable:
-            words = f"{unreadable[uri]}; {words}"
-        kind = UNREADABLE if uri in unreadable else MISSING
-        missing.append(Missing(uri, text, words, kind, in_fuel))
-    return world, chosen, (*missing, *elements)
+        missing.append(Missing(uri, text, words, kind))
+    return world, chosen, tuple(missing)
 
 
 class MissingList(OptionList):
@@ -131,11 +121,7 @@ class MissingList(OptionList):
         ("choose", "enter", "select", "remedy", "choose a folder or a shape, or leave it out"),
         ("guess", "a", "guess", "guess", "take the guessed shape for all undecided files, or else for this one"),
         ("without", "w", "without", "without", "leave this one out"),
-        ("fetch", "f", "fetch", "fetch", "download what is missing from Gazebo Fuel; again: stop"),
     )
-
-    class Fetch(Message):
-        """The user wants what is missing from Fuel, or else no more of it."""
 
     @dataclass
     class Chosen(Message):
@@ -174,8 +160,6 @@ class MissingList(OptionList):
         text = Text(no_wrap=True, overflow="ellipsis").append(DONE if row.remedy else OPEN, f"bold {color}")
         # The last word of a URI tells models and meshes apart.
         name = plain(unquote(row.uri).rstrip("/").rsplit("/", 1)[-1]) or plain(row.uri)
-        if row.kind == UNSUPPORTED:
-            name = f"{row.uri.partition(' ')[0]} in {name}"
         return text.append(f" {name}  ").append(plain(row.words), "dim")
 
     @on(OptionList.OptionSelected)
@@ -185,7 +169,7 @@ class MissingList(OptionList):
             return
         row = self._rows[event.option_index]
         if row.kind == UNSUPPORTED:
-            self.post_message(self.Chosen({row.uri: "" if row.remedy else "none"}))
+            self.action_without()
             return
 
         def take(text: str | None) -> None:
@@ -195,24 +179,19 @@ class MissingList(OptionList):
         self.app.push_screen(AskRemedy(row), take)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        if action == "fetch":
-            return any(row.in_fuel and row.remedy in ("", "auto") for row in self._rows)
         return bool(self._rows) or action not in ("guess", "without")
 
     def action_guess(self) -> None:
-        rows = [row for row in self._rows if not row.remedy] or self._here
-        self.post_message(self.Chosen({row.uri: "none" if row.kind == UNSUPPORTED else "auto" for row in rows}))
+        undecided = [row.uri for row in self._rows if not row.remedy]
+        self.post_message(self.Chosen(dict.fromkeys(undecided or self._here, "auto")))
 
     def action_without(self) -> None:
-        self.post_message(self.Chosen({row.uri: "none" for row in self._here}))
-
-    def action_fetch(self) -> None:
-        self.post_message(self.Fetch())
+        self.post_message(self.Chosen(dict.fromkeys(self._here, "none")))
 
     @property
-    def _here(self) -> tuple[Missing, ...]:
+    def _here(self) -> list[str]:
         place = self.highlighted
-        return () if place is None else self._rows[place : place + 1]
+        return [] if place is None else [row.uri for row in self._rows[place : place + 1]]
 
 
 class AskRemedy(ModalScreen[str | None]):

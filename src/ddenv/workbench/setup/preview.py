@@ -6,9 +6,11 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from threading import Thread, current_thread
+from typing import Any, ClassVar
 
 from rich.text import Text
 from textual import on, work
@@ -21,18 +23,18 @@ from textual.worker import get_current_worker
 from ddenv.errors import UserError
 from ddenv.runs.folder import free_run_path, runs_folder
 from ddenv.runs.remedies import remember_remedies
-from ddenv.text import first_of, plain, shortened
+from ddenv.text import plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.place import Place, place_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice, read_choice
-from ddenv.workbench.setup.fetching import Download, start_download
 from ddenv.workbench.setup.fields import OptionsForm
 from ddenv.workbench.setup.files import remember
 from ddenv.workbench.setup.missing_files import MissingList
 from ddenv.workbench.setup.start_run import Past, past_of
 from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.bindings import keys
 from ddenv.world.pose import Point
 
 # What to do about each kind of note; it comes first, since the end of a line may not fit.
@@ -57,6 +59,11 @@ class Preview(Vertical):
     are in the form, which it fills in. `past` is what earlier runs of the choice say of its cost.
     """
 
+    BINDINGS: ClassVar = keys(
+        "missing",
+        ("fetch", "f", "fetch", "fetch", "download what is missing from Gazebo Fuel; again: stop"),
+    )
+
     @dataclass
     class Read(Message):
         """The choice was read; or it cannot be read, and the map says why. `opened`: the user opened its file just now."""
@@ -76,8 +83,8 @@ class Preview(Vertical):
         self.awaited = True
         self.past = Past()
         self.picked_next = ""
-        # What comes from Fuel just now.
-        self._download: Download | None = None
+        # While models come from Fuel.
+        self._fetching: Thread | None = None
         # Whether the places in the form are of no scenario: another bare world keeps them.
         self._keeps_places = False
         # Where the robot has room, m, if it stands inside a model.
@@ -94,7 +101,9 @@ class Preview(Vertical):
 
     def on_mount(self) -> None:
         self.query_one("#start-notes").display = False
-        self._polling = self.set_interval(0.1, self._show_download, pause=True)
+
+    def on_unmount(self) -> None:
+        self._fetching = None
 
     def on_resize(self) -> None:
         self._show_picking()
@@ -110,7 +119,6 @@ class Preview(Vertical):
 
     def show_nothing(self, why: str) -> None:
         self.choice = None
-        self._stop_download()
         self.pick("")
         self.workers.cancel_group(self, "notes")
         self._show_about()
@@ -175,41 +183,47 @@ class Preview(Vertical):
 
     @on(MissingList.Chosen)
     def _remedies_chosen(self, event: MissingList.Chosen) -> None:
-        """Remembers them, and reads the world again; until then the map stays."""
         event.stop()
-        if self.choice is not None:
-            remember_remedies(event.remedies)
+        remember_remedies(event.remedies)
+        self._read_again()
+
+    def _read_again(self) -> None:
+        """Reads the world with other remedies or files; until then the map stays."""
+        if self.choice:
             self._read(self.choice.path, False, again=True)
 
-    @on(MissingList.Fetch)
-    def _fetch_or_stop(self, event: MissingList.Fetch) -> None:
-        event.stop()
-        if self._download is not None:
-            self._stop_download()
-        elif self.choice is not None:
-            self._download = start_download(self.choice.settings.world, self.choice.settings.reading)
-            self._polling.resume()
+    def action_fetch(self) -> None:
+        if self._fetching:
+            self._fetching = None
+            self._read_again()
+        elif self.choice:
+            # Where a server hangs, this thread does not hold up the end of the workbench.
+            self._fetching = Thread(target=self._fetch, args=(self.choice,), daemon=True)
+            self._fetching.start()
 
-    def _stop_download(self) -> None:
-        if self._download is not None:
-            self._download.stopped = True
+    def _fetch(self, choice: Choice) -> None:
+        """Downloads from Fuel what a world lacks; the user may look at others meanwhile."""
+        from ddenv.runs.fetching import fetch_missing
 
-    def _show_download(self) -> None:
-        """Shows how far it is. At its end the world is read again: some models may be there even if it failed."""
-        download = self._download
-        if download is None:
-            return
-        if not (download.ended or download.stopped):
-            self.missing.border_title = Text(plain(f"{download.words}; f stops"))
-            return
-        self._download = None
-        self._polling.pause()
-        if download.fetched:
-            self.notify(plain(first_of(download.fetched, 1)), timeout=8, markup=False)
-        if download.error:
-            self.notify(plain(download.error), severity="error", timeout=12, markup=False)
-        if self.choice is not None:
-            self._read(self.choice.path, False, again=True)
+        needs = choice.settings
+
+        def arrived(name: str, received: int, total: int | None) -> None:
+            if self._fetching is not current_thread():
+                # Ends the thread, and leaves nothing behind.
+                raise SystemExit
+            whole = f" of {total / 1e6:.1f}" if total else ""
+            words = Text(plain(f"{name}: {received / 1e6:.1f}{whole} MB; f stops"))
+            call_if_open(self, setattr, self.missing, "border_title", words)
+
+        def tell(words: str) -> None:
+            call_if_open(self, partial(self.notify, timeout=10, markup=False), plain(words))
+
+        try:
+            fetch_missing(needs.world, needs.reading, lambda model: partial(arrived, model.name), tell)
+        except UserError as error:
+            tell(str(error))
+        self._fetching = None
+        call_if_open(self, self._read_again)
 
     @property
     def spawn(self) -> tuple[float, ...] | None:

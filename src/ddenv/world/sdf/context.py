@@ -125,7 +125,7 @@ class Context:
         absent = _also("also missing", [uri for uri in others if uri not in self.unreadable])
         broken = _also("also unreadable", [uri for uri in others if uri in self.unreadable])
         message = f"{self.missing[first]}{absent}{broken}{how_to_fetch(self.missing)}"
-        raise MissingFiles(message, list(self.missing), self.unreadable)
+        raise MissingFiles(message, dict.fromkeys(self.missing, "") | self.unreadable)
 
     def ignores(self, tag: str) -> bool:
         return tag in self.reading.ignore
