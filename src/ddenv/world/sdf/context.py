@@ -124,8 +124,10 @@ class Context:
         first, *others = self.missing
         absent = _also("missing", [uri for uri in others if uri not in self.unreadable])
         broken = _also("unreadable", [uri for uri in others if uri in self.unreadable])
-        message = f"{self.missing[first]}{absent}{broken}{how_to_fetch(self.missing)}"
-        raise MissingFiles(message, dict.fromkeys(self.missing, "") | self.unreadable)
+        raise MissingFiles(
+            f"{self.missing[first]}{absent}{broken}{how_to_fetch(self.missing)}",
+            dict.fromkeys(self.missing, "") | self.unreadable,
+        )
 
     def ignores(self, tag: str) -> bool:
         return tag in self.reading.ignore
@@ -200,8 +202,7 @@ def version(element: Element) -> tuple[int, int]:
 
 def refuse(element: Element, tag: Ignorable, message: str) -> UserError:
     """The error for an element that is not supported but can be left out with `--ignore`."""
-    words = f"{place(element)}: {message}; leave it out with --ignore {tag}"
-    return Unsupported(words, tag, element.source)
+    return Unsupported(f"{place(element)}: {message}; leave it out with --ignore {tag}", tag, element.source)
 
 
 def note_unread(element: Element, context: Context) -> None:
