@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.settings import IGNORABLE
-from ddenv.world.access import Unusable, read_bytes
+from ddenv.world.access import MissingFiles, Unusable, read_bytes
 from ddenv.world.files.fuel import FuelModel
 from ddenv.world.files.fuel_download import Archive, Shown, download
 from ddenv.world.files.resources import fuel_model
@@ -23,8 +23,7 @@ def fetch_missing(
 
     `show` gets each model before it comes, and `tell` a line on it when it is there. Raises UserError.
     """
-    # What cannot be simulated is no reason to stop.
-    whole = reading.model_copy(update={"inside": False, "ignore": IGNORABLE})
+    whole = reading.model_copy(update={"inside": False})
     tried: set[FuelModel] = set()
     while missing := {model: uri for model, uri in missing_models(world, whole).items() if model not in tried}:
         for model, uri in missing.items():
@@ -43,7 +42,8 @@ def missing_models(world: Path, reading: Reading) -> dict[FuelModel, str]:
     Raises UserError for other faults.
     """
     resources = disk_of(world, reading)
-    parse_world(read_bytes(world), world, reading, resources)
+    with suppress(MissingFiles):
+        parse_world(read_bytes(world), world, reading, resources)
     return {model: uri for uri in resources.absent() if (model := fuel_model(uri))}
 
 

@@ -125,7 +125,7 @@ async def test_elements_that_are_not_supported_are_left_out_once_the_user_says_s
         ]
         assert "2 missing files, 2 unsupported elements without a remedy: press m" in session.told("cost")
         await session.press("m", "home", "down", "down", "enter")
-        assert rows(session)[2:] == ["✓ <joint>  left out", "? <heightmap>  left out"]
+        assert rows(session)[2:] == ["✓ <joint>  not supported, left out", "? <heightmap>  not supported, left out"]
         await session.press("m", "a")
         assert [row[0] for row in rows(session)] == ["✓"] * 4
         await session.place(spawn_x="0", goal_x="8")

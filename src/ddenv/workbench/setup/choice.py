@@ -134,7 +134,7 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
     except Unsupported as error:
         # Without the user's word it is left out on the map alone.
         choice = read_choice(path, {**options, "ignore": (*options.get("ignore", ()), error.tag)})
-        element = Missing(error.name, remembered().get(error.name, ""), "left out", UNSUPPORTED)
+        element = Missing(error.name, remembered().get(error.name, ""), "not supported, left out", UNSUPPORTED)
         return replace(choice, missing=(*choice.missing, element))
     settings = settings.model_copy(update={"reading": reading_of(settings.reading, **chosen)})
     return Choice(path, world, settings, bare, options=chosen, missing=missing)

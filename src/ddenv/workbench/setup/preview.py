@@ -212,8 +212,8 @@ class Preview(Vertical):
                 # Ends the thread, and leaves nothing behind.
                 raise SystemExit
             whole = f" of {total / 1e6:.1f}" if total else ""
-            words = Text(plain(f"{name}: {received / 1e6:.1f}{whole} MB; f stops"))
-            call_if_open(self, setattr, self.missing, "border_title", words)
+            words = f"{name}: {received / 1e6:.1f}{whole} MB; f stops"
+            call_if_open(self, setattr, self.missing, "border_title", Text(plain(words)))
 
         def tell(words: str) -> None:
             call_if_open(self, partial(self.notify, timeout=10, markup=False), plain(words))

@@ -200,8 +200,7 @@ def version(element: Element) -> tuple[int, int]:
 
 def refuse(element: Element, tag: Ignorable, message: str) -> UserError:
     """The error for an element that is not supported but can be left out with `--ignore`."""
-    words = f"{place(element)}: {message}; leave it out with --ignore {tag}"
-    return Unsupported(words, tag, element.source)
+    return Unsupported(f"{place(element)}: {message}; leave it out with --ignore {tag}", tag, element.source)
 
 
 def note_unread(element: Element, context: Context) -> None:
