@@ -187,7 +187,8 @@ def _needed_there(results: Sequence[Mapping[str, Any]], without: str) -> str:
     from ddenv.evidence.rates import Shown
     from ddenv.runfile.state import BROKEN
 
-    rest, left = Environment.whole(1), Environment.whole(2)
+    rest = Environment.whole(1)
+    left = Environment.whole(2)
     models = {rest: without, left: None}
     shown: dict[tuple[str | None, int], Shown] = {
         (one["without"], one["seed"]): "broken" if one["outcome"] in BROKEN else one["outcome"] == "similar"

@@ -118,7 +118,8 @@ class Bench:
             return None
         environment, state = journal.number(wanted.environment), journal.state
         # All candidates meet the same noise.
-        reduction, number = asked_of(state), len(state.tests) + 1
+        reduction = asked_of(state)
+        number = len(state.tests) + 1
         seed = seed_of(reduction, wanted.run)
         of_round = state.round is not None and wanted.why == "round"
         round, candidate = (journal.current.number, wanted.candidate) if of_round else (None, None)

@@ -258,7 +258,8 @@ class Sight:
 
     def evidence(self, journal: Journal, test: int) -> Evidence:
         """The evidence if `test` was the last similar run."""
-        state, run = journal.state, journal.state.test(test)
+        state = journal.state
+        run = state.test(test)
         # If several failures count as f, the one that the run showed.
         ends = [end_of(state.test(test)) for test in state.failures]
         end = ends[0] if run.end_pose is None else min(ends, key=lambda end: math.dist(end, end_of(run)))

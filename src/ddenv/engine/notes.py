@@ -40,7 +40,9 @@ def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal)
     """Notes what the files alone show of the start, before the first test."""
     if journal.state.baseline is not None:
         return
-    spawn, goal, epsilon = scenario.robot.spawn, scenario.goal, scenario.failure.epsilon
+    spawn = scenario.robot.spawn
+    goal = scenario.goal
+    epsilon = scenario.failure.epsilon
     for about, words in notes_on_start(world, robot, spawn, (goal.x, goal.y)):
         note(journal, about, words)
     for about, words in note_floor(world, robot, spawn, journal.state.elements):

@@ -73,7 +73,9 @@ def plan(
             raise UserError("--test: needs a run; a scenario has no tests yet")
         if not 0 < test <= len(state.tests):
             raise UserError(f"--test: there is no test {test}; the run has tests 1 to {len(state.tests)}")
-        models, seed = state.models_of(state.test(test)), state.test(test).seed
+        recorded = state.test(test)
+        models = state.models_of(recorded)
+        seed = recorded.seed
     for name in leave_out or []:
         if name not in models:
             raise UserError(f"--leave-out: '{name}' is not one of the {len(models)} models in this world")

@@ -57,7 +57,8 @@ def slice_audit(journal: Journal) -> tuple[Wanted, ...]:
     state, here = journal.state, journal.state.here
     if here is None or not here.to_audit or here.evidence_test is None or state.refuted is not None:
         return ()
-    environment, run = journal.environment, state.test(here.evidence_test).run
+    environment = journal.environment
+    run = state.test(here.evidence_test).run
     return () if journal.test(environment, run) is not None else (Wanted(environment, run, "audit"),)
 
 
@@ -108,7 +109,8 @@ def repeats(journal: Journal, audit: Test) -> bool:
     """Whether a finished audit has the bits of the run that implies it; True for one without bits, since its worker died."""
     if audit.audits is None or not (again := journal.file.motions(audit.id)):
         return True
-    source, state = journal.state.test(audit.audits), journal.state
+    state = journal.state
+    source = state.test(audit.audits)
     # What took no part may have moved by itself.
     gone = (state.environments[0] - state.environments[audit.environment]).names(state.elements)
     first = {name: rows for name, rows in journal.file.motions(source.id).items() if name not in gone}

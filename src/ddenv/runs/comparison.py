@@ -42,9 +42,9 @@ def compared(first: Recent, second: Recent) -> Iterator[Difference]:
     yield "run", plain(first.path.stem), plain(second.path.stem)
     for name, say in _FACTS.items():
         yield name, say(first), say(second)
-    both = _names(first, second, True)
+    both = _names(first, second, in_both=True)
     yield "in both", both, both
-    yield "only in this one", _names(first, second, False), _names(second, first, False)
+    yield "only in this one", _names(first, second, in_both=False), _names(second, first, in_both=False)
     yield from differences(first.chosen, second.chosen)
 
 
@@ -66,8 +66,9 @@ def _value(value: Any) -> str:
     return NONE if value is None else truncated(plain(value), LONGEST)
 
 
-def _names(run: Recent, other: Recent, both: bool) -> str:
-    names = [plain(name) for name in run.kept if (name in other.kept) == both]
+def _names(run: Recent, other: Recent, *, in_both: bool) -> str:
+    """The models that are left in `run`: those that are left in `other` too, or those that are not."""
+    names = [plain(name) for name in run.kept if (name in other.kept) == in_both]
     return f"{len(names)}: {first_of(names, MOST_COMPARED)}" if names else NONE
 
 

@@ -222,4 +222,4 @@ def _moved(part: Part, transform: np.ndarray, names: tuple[str, ...]) -> Part:
 def _numbers(element: Element | None, kind: type = float) -> np.ndarray:
     """All numbers in the text of `element`. Raises ValueError for any other word."""
     text = "" if element is None else element.text or ""
-    return np.fromstring(text, dtype=kind, sep=" ") if text.strip() else np.zeros(0, dtype=kind)
+    return np.array(text.split(), dtype=kind)

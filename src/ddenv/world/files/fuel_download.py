@@ -36,10 +36,15 @@ from urllib.request import (
 from ddenv.world.access import SDF_ENDINGS, Unusable
 from ddenv.world.files.fuel import HOSTS, FuelModel, caches, quoted, refuse_link_out
 
-# The longest wait for a byte, and for a whole model, s.
-TIMEOUT, LONGEST = 30.0, 3600.0
-# The largest archive, and the largest and the most files in it, bytes.
-ARCHIVE_LIMIT, FILES_LIMIT, MOST_FILES = 1_000_000_000, 4_000_000_000, 20_000
+# The longest wait for a byte, s.
+TIMEOUT = 30.0
+# The longest wait for a whole model, s.
+LONGEST = 3600.0
+# The maximum size of an archive, bytes.
+ARCHIVE_LIMIT = 1_000_000_000
+# The maximum size of all files in it, bytes, and their maximum number.
+FILES_LIMIT = 4_000_000_000
+MOST_FILES = 20_000
 CHUNK = 1 << 16  # bytes
 # The header in which Fuel says what the newest version is.
 VERSION = "X-Ign-Resource-Version"
@@ -71,7 +76,8 @@ def download(model: FuelModel, shown: Shown) -> tuple[Path, Archive | None]:
     try:
         cache.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".ddenv-", dir=cache) as temporary:
-            file, unpacked = Path(temporary, "archive.zip"), Path(temporary, "model")
+            file = Path(temporary, "archive.zip")
+            unpacked = Path(temporary, "model")
             archive = _receive(model, file, shown)
             folder = cache / HOSTS[0] / model.folder / archive.version
             refuse_link_out(folder)
