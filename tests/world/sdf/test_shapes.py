@@ -176,6 +176,22 @@ def test_the_smaller_friction_counts(read):
     assert read(model(CUBE, bullet)).models[0].collisions[0].mu == 0.4
 
 
+@pytest.mark.parametrize(
+    ("properties", "mu"),
+    [
+        ("<drake:mu_static>0.2</drake:mu_static><drake:mu_dynamic>0.05</drake:mu_dynamic>", 0.05),
+        ("<drake:mu_static>0.2</drake:mu_static>", 0.2),
+        ("", 0.3),
+    ],
+)
+def test_the_friction_of_drake_counts_before_that_of_gazebo(read, properties, mu):
+    surface = "<surface><friction><ode><mu>0.3</mu><mu2>0.3</mu2></ode></friction></surface>"
+    own = f"<drake:proximity_properties>{properties}</drake:proximity_properties>"
+    world = read(model(CUBE, surface + own))
+    assert world.models[0].collisions[0].mu == mu
+    assert not any("drake" in note.what for note in world.notes)
+
+
 COLORS = {
     "<material><diffuse>1 0 0 1</diffuse><ambient>0 1 0 1</ambient></material>": (1, 0, 0, 1),
     "<material><ambient>0 1 0 0</ambient></material>": (0, 1, 0, 1),

@@ -94,6 +94,14 @@ def test_shapes_with_the_friction_of_gazebo_elements():
     assert model.links[1].collisions[0].mu == 0.7
 
 
+def test_the_friction_of_drake_is_that_of_its_collision():
+    own = '<drake:proximity_properties><drake:mu_dynamic value="0.05"/><drake:rigid_hydroelastic/>'
+    collision = shape('<sphere radius="0.1"/>').replace(
+        "</collision>", f"{own}</drake:proximity_properties></collision>"
+    )
+    assert read(link("base", BODY + collision)).collisions[0].mu == 0.05
+
+
 def test_limits_effort_and_damping():
     limit = '<limit lower="-1" upper="2" effort="3" velocity="4"/><dynamics damping="0.5" friction="1"/>'
     model = read(

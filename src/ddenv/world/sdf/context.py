@@ -29,7 +29,8 @@ QUIET: dict[str, frozenset[str]] = {
         "link": "pose inertial collision visual gravity self_collide kinematic light must_be_base_link velocity_decay",
         "inertial": "mass inertia pose density auto_inertia_params",
         "inertia": "ixx ixy ixz iyy iyz izz",
-        "collision": "pose geometry surface max_contacts laser_retro density auto_inertia_params",
+        "collision": "pose geometry surface max_contacts laser_retro density auto_inertia_params "
+        "drake:proximity_properties",
         "surface": "friction bounce contact soft_contact",
         "friction": "ode bullet torsional",
         "bounce": "restitution_coefficient threshold",

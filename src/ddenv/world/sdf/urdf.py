@@ -131,7 +131,7 @@ def _geometry(part: Element, context: Context) -> Element:
 
 
 def _surface(link: str, part: Element, robot: Element) -> list[Element]:
-    """The `<surface>` of a collision from `<gazebo reference="link">`, if there is one."""
+    """What says how slippery a collision is: a `<surface>` from `<gazebo reference="link">`, and Drake's own properties."""
     coefficients = [
         element(ours, found, text_of(found) or given(found, "value"))
         for extension in robot.findall("gazebo")
@@ -139,7 +139,14 @@ def _surface(link: str, part: Element, robot: Element) -> list[Element]:
         if (found := extension.find(tag)) is not None and extension.get("reference") == link
     ]
     friction = element("friction", part, "", element("ode", part, "", *coefficients))
-    return [element("surface", part, "", friction)] if coefficients else []
+    surface = [element("surface", part, "", friction)] if coefficients else []
+    return surface + [_drake_properties(own) for own in part.findall("drake:proximity_properties")[:1]]
+
+
+def _drake_properties(own: Element) -> Element:
+    """Drake's own properties of a collision, whose values are attributes in URDF and text in SDF."""
+    values = [element(each.tag, each, given(each, "value")) for each in own if each.get("value")]
+    return element(own.tag, own, "", *values)
 
 
 def _material(part: Element, robot: Element) -> list[Element]:
