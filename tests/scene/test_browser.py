@@ -145,12 +145,15 @@ async def test_the_picture_shows_robot_goal_and_failure(reduced, start_scene):
         await page.value("document.querySelectorAll('.card').forEach((card) => card.style.opacity = 0)")
         assert await page.value("forbidden") == []
 
-        async def is_drawn() -> bool:
-            return near(await page.picture(), ROBOT_YELLOW) > 100
+        pictures = []
 
-        # The browser shows a frame some time after it was drawn: until then the canvas is white.
+        async def is_drawn() -> bool:
+            pictures.append(await page.picture())
+            return near(pictures[-1], ROBOT_YELLOW) > 100
+
+        # The browser shows a frame some time after it was drawn: until then, and now and again later, the canvas is white.
         await eventually(is_drawn, lambda: "no robot's yellow")
-        picture = await page.picture()
+        picture = pictures[-1]
         process.terminate()
         process.wait(PATIENCE)
         await shows(page, "document.getElementById('lost').style.display === 'block'")

@@ -57,8 +57,10 @@ class _Checker:
             source, root = pending.popitem()
             checked.add(source)
             yield from self._inside(root, version(root) >= (1, 8), is_known=True)
-            included = filter(None, map(self._root_of, root.iter("include")))
-            pending |= {each.source: each for each in included if each.tag == "sdf" and each.source not in checked}
+            for include in root.iter("include"):
+                included = self._root_of(include)
+                if included is not None and included.tag == "sdf" and included.source not in checked:
+                    pending[included.source] = included
 
     def _inside(self, element: Element, no_colons: bool, *, is_known: bool) -> Iterator[Refusal]:
         """What is refused below `element`. Nothing is known of what an element holds that is not `is_known` itself."""
