@@ -48,6 +48,12 @@ def small_world(inside: str) -> World:
     return parse_world(text, DATA / "small.world", READING)
 
 
+def test_a_model_of_which_nothing_can_be_touched_is_static():
+    world = small_world("<model name='outer'><model name='plugin'><static>1</static></model></model>")
+    check_world(world)
+    assert world.models[0].static
+
+
 @pytest.mark.parametrize(
     "empty", ["<model name='a'/>", "<model name='a' />", "<model name='a'></model>", "<model name='a'\n/>"]
 )

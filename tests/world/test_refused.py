@@ -184,6 +184,11 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
         "this link name is used twice": [model(LINK * 2)],
         "this joint name is used twice": [two(*2 * [joint(AB, "fixed")])],
         r"/model\[@name='m'\]: has no <link>": [model("")],
+        r"/model\[@name='m'\]/model\[@name='i'\]: has no <link>": [
+            model("<model name='i'/>"),
+            model("<static>1</static><model name='i'/>"),
+            model("<link name='l'/><model name='i'/>"),
+        ],
         # A joint's parent `world` would mean either of two things.
         "the name 'world' is reserved by SDF": [
             model("<link name='world'/>"),

@@ -41,12 +41,11 @@ def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context
     nominal = outer.placed(part)
     actual = nominal if saved is None or saved.pose is None else saved.pose
     spot = Spot(outer.inside(part), nominal, actual, static=_is_static(part))
+    _check_has_link(part, spot.scope)
     builder = _Builder(context)
     builder.add(spot, saved)
-    if not builder.links:
-        # Only a static model may have none, for example if it only holds a plugin, and one that holds other models.
-        if not spot.static and not spot.scope.parts:
-            raise complain(part.element, "has no <link>")
+    is_empty = not builder.links
+    if is_empty:
         context.note("ignored", part.element, "it has no <link>: nothing can touch it")
         builder.links.append(Link("link", actual, None, (), ()))
     if saved is not None:
@@ -63,7 +62,7 @@ def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context
         gravity=spot.static or any(pulled),
         self_collide=any(builder.self_collide),
     )
-    if len(still_links(model)) == len(model.links):
+    if is_empty or len(still_links(model)) == len(model.links):
         return _still(model)
     check_tree(builder.joints, part.element)
     # These settings differ between links, but are simulated for the model as a whole.
@@ -143,11 +142,18 @@ class _Builder:
         prefix = spot.prefix if part.merged else f"{spot.prefix}{part.name}::"
         static = spot.static or (_is_static(part) and not part.merged)
         inner = spot.scope.inside(part)
+        _check_has_link(part, inner)
         self.add(Spot(inner, spot.nominal @ local, there, prefix, spot.scale, static), saved)
         if static and not spot.static:
             # A static model nested in a moving one: its links are welded to the world.
             links = self.links[before:]
             self.joints += [Joint(f"{link.name} (static)", "fixed", WORLD, link.name, link.pose) for link in links]
+
+
+def _check_has_link(part: Part, scope: Scope) -> None:
+    """Raises UserError for a model that has none, except a static one (of a plugin), and one that holds other models."""
+    if not scope.parts and scope.element.find("link") is None and not _is_static(part):
+        raise complain(part.element, "has no <link>")
 
 
 def _is_static(part: Part) -> bool:
