@@ -319,6 +319,8 @@ async def other_failures(pilot: Pilot[int]) -> None:
 async def guide(pilot: Pilot[int]) -> None:
     """A platform is pinned, and the platforms are tried alone: they are enough."""
     await pause(pilot, True)
+    # A test that still runs may end in a reduction that waits.
+    await until(pilot, lambda: not state(pilot).running_tests)
     if state(pilot).status == "waiting":
         # A pin would ask what becomes of the reduction that waits.
         await press(pilot, "a")
