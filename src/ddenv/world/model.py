@@ -77,7 +77,10 @@ Shape = Box | Cylinder | Sphere | Plane | Capsule | Ellipsoid | Mesh
 
 @dataclass(frozen=True, slots=True)
 class Collision:
-    """`mu` is the Coulomb friction coefficient: the smaller of SDF's `ode/mu` and `ode/mu2`."""
+    """`mu` is the Coulomb friction coefficient: the smaller of SDF's `ode/mu` and `ode/mu2`.
+
+    The pieces of a mesh that is not convex follow each other in their link, all with the `name` of their `<collision>`.
+    """
 
     name: str
     shape: Shape

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from hashlib import blake2b
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 from pydantic_core import PydanticCustomError
@@ -48,12 +48,14 @@ class Reading(Section):
     `model_path` are folders that hold models. `stand_ins` maps the beginning of a URI to a simple shape that stands in for what
     cannot be found there, such as `cylinder:0.3,1.0`, or `*`, all that is missing, to `auto`. `ignore` names kinds of elements
     to leave out instead of refusing the file. With `inside`, each collision of a model that never moves is a model of its own.
+    What collides in place of a mesh that is not convex is `mesh`: its convex pieces, or its convex hull.
     """
 
     model_path: tuple[Path, ...] = ()
     stand_ins: dict[str, str] = {}
     ignore: tuple[Ignorable, ...] = ()
     inside: bool = False
+    mesh: Literal["pieces", "hull"] = "pieces"
 
 
 PLAIN = Reading()

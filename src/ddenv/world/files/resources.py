@@ -10,6 +10,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -18,15 +19,33 @@ from urllib.parse import unquote
 from ddenv.text import first_of
 from ddenv.world.access import Missing, Unusable, folders_of, is_file, is_folder, read, reason, xml_root
 from ddenv.world.files.fuel import GAZEBO, FuelModel, cached, caches, hosts, in_fuel, newest, refuse_link_out
-from ddenv.world.files.meshes import build, read_parts, unpack
+from ddenv.world.files.meshes import build, read_parts, unpack, unpack_pieces
 from ddenv.world.files.roots import absolute, source_of
 from ddenv.world.files.triangles import Part
 from ddenv.world.model import Found, Mesh
+from ddenv.world.pose import Vector
 from ddenv.world.tinyxml import Element
 
 SDF_LIMIT = 50_000_000  # bytes of a file
 # Of the parts of mesh files that are kept in case that they are used again, bytes.
 MOST_KEPT = 200_000_000
+
+
+@dataclass(frozen=True)
+class MeshPart:
+    """A mesh file, or its part called `submesh`, named by a URI in a file of the folder `base`.
+
+    `center` moves the middle of its bounding box to the origin.
+    """
+
+    uri: str
+    base: Path
+    submesh: str = ""
+    center: bool = False
+
+    def key(self, kind: str, *more: Any) -> str:
+        """The name of what is made of it, for `Resources.taken`."""
+        return json.dumps([kind, self.uri, str(self.base), self.submesh, self.center, *more])
 
 
 class Resources:
@@ -42,6 +61,7 @@ class Resources:
         self._folders = folders
         self._files: dict[str, tuple[Path, bytes]] = {}
         self._meshes: dict[str, Mesh] = {}
+        self._pieces: dict[str, list[Mesh]] = {}
         self._failed: dict[str, Missing | Unusable] = {}
         # Collisions and visuals use the same files, and different parts of them; the longest known first.
         self._parts_of: dict[Path, list[Part]] = {}
@@ -61,15 +81,24 @@ class Resources:
             self._files[key] = Path(path.decode("utf-8", "surrogateescape")), text
         return self._files[key]
 
-    def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
-        """A mesh file in m, or its part called `submesh`; `center` moves the middle of its bounding box to the origin."""
-        self.asked[uri, base] = None
-        way: list[Any] = [submesh, center, convex]
-        key = json.dumps(["mesh", uri, str(base), *way])
+    def mesh(self, part: MeshPart, *, convex: bool) -> Mesh:
+        """A mesh in m; the convex hull of it if it is to be `convex`."""
+        self.asked[part.uri, part.base] = None
+        key = part.key("mesh", convex)
         if key not in self._meshes:
-            packed = self._bytes(key, lambda folders: self._mesh(uri, base, folders, *way))
-            self._meshes[key] = unpack(json.dumps([uri, *way]), packed)
+            packed = self._bytes(
+                key, lambda folders: build(self._parts(part, folders), part.submesh, part.center, convex)
+            )
+            self._meshes[key] = unpack(json.dumps([part.uri, part.submesh, part.center, convex]), packed)
         return self._meshes[key]
+
+    def pieces(self, part: MeshPart, scale: Vector, most: int) -> list[Mesh]:
+        """The convex pieces of a mesh, in m and times `scale`, at most `most`; a mesh that is convex is a single one."""
+        key = part.key("pieces", scale, most)
+        if key not in self._pieces:
+            packed = self._bytes(key, lambda folders: _cut(self._parts(part, folders), part, scale, most))
+            self._pieces[key] = unpack_pieces(key, packed)
+        return self._pieces[key]
 
     def config_fault(self, folder: Path) -> str:
         """Why the model.config in the folder of a model cannot be read, so that its model.sdf is taken; empty if it can."""
@@ -81,9 +110,9 @@ class Resources:
     def rename(self, uri: str, folder: str, new: str, new_folder: str) -> None:
         """Makes the meshes called `uri` in files of `folder` also known as `new` in files of `new_folder`."""
         for key, content in list(self.taken.items()):
-            kind, *names, submesh, center, convex = [*json.loads(key), "", False, False][:6]
-            if [kind, *names] == ["mesh", uri, folder]:
-                self.taken[json.dumps([kind, new, new_folder, submesh, center, convex])] = content
+            kind, *names = json.loads(key)
+            if kind in ("mesh", "pieces") and names[:2] == [uri, folder]:
+                self.taken[json.dumps([kind, new, new_folder, *names[2:]])] = content
 
     def _bytes(self, key: str, ask: Callable[[Mapping[Path, str]], bytes]) -> bytes:
         if key in self._failed:
@@ -114,10 +143,6 @@ class Resources:
         self.found[uri, base] = Found(uri, path, *source_of(path, roots))
         return path
 
-    def _mesh(self, uri: str, base: Path, folders: Mapping[Path, str], *way: Any) -> bytes:
-        path = self._find(uri, base, folders, model=False)
-        return build(self._parts(path), *way)
-
     def _sdf(self, uri: str, base: Path, folders: Mapping[Path, str]) -> bytes:
         """The bytes to be stored for an SDF file: its path, a NUL byte, its content."""
         try:
@@ -130,13 +155,21 @@ class Resources:
             path, text = FOLDER / f"{name}.sdf", f"<sdf version='1.5'>{_TEXTS[name]}</sdf>".encode()
         return str(path).encode("utf-8", "surrogateescape") + b"\0" + text
 
-    def _parts(self, path: Path) -> list[Part]:
+    def _parts(self, part: MeshPart, folders: Mapping[Path, str]) -> list[Part]:
+        path = self._find(part.uri, part.base, folders, model=False)
         if path not in self._parts_of:
             self._parts_of[path] = read_parts(path)
         found = self._parts_of[path]
         while len(self._parts_of) > 1 and sum(map(_size, self._parts_of.values())) > MOST_KEPT:
             del self._parts_of[next(iter(self._parts_of))]
         return found
+
+
+def _cut(parts: list[Part], part: MeshPart, scale: Vector, most: int) -> bytes:
+    # Loaded late: what was cut before is shown without it.
+    from ddenv.world.files.pieces import build_pieces
+
+    return build_pieces(parts, part.submesh, part.center, scale, most)
 
 
 def _size(parts: Sequence[Part]) -> int:

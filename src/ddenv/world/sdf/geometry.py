@@ -11,12 +11,14 @@ import numpy as np
 from ddenv.text import Names
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.extent import circle, convex_hull, polygon_area
+from ddenv.world.files.boxes import box_of
 from ddenv.world.files.meshes import convex_hull as hull
+from ddenv.world.files.resources import MeshPart
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
 from ddenv.world.pose import HERE, ONE, Pose, Vector, pointing, vector
 from ddenv.world.sdf.context import Context, refuse
 from ddenv.world.sdf.standin import AUTO, NONE, SIZES, Placed
-from ddenv.world.sdf.xml import Element, complain, numbers, text_of, truth
+from ddenv.world.sdf.xml import Element, complain, number, numbers, text_of, truth
 from ddenv.world.write import primitive
 
 SIDES = 32  # of a cone
@@ -36,6 +38,10 @@ DEFAULT_SIZES: dict[tuple[str, str], tuple[float, ...]] = {
     ("polyline", "height"): (1.0,),
     ("sphere", "radius"): (1.0,),
 }
+# The maximum number of convex pieces of one mesh, and that of libsdformat for <convex_decomposition> without a number.
+MOST_PIECES = 512
+DEFAULT_HULLS = 16
+ROUGH = "contact at the edges of those that are no boxes is rough"
 RANGE = f"sizes must be from {SMALLEST:g} to {LARGEST:g} m"
 
 
@@ -136,19 +142,50 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
     submesh = element.find("submesh")
     name = "" if submesh is None else text_of(submesh.find("name"))
     center = submesh is not None and truth(submesh, "center", False)
-    convex = parent.tag == "collision"
+    full = _times(own, scale)
+    part = MeshPart(uri, element.source.parent, name, center)
     try:
-        mesh = context.resources.mesh(uri, element.source.parent, submesh=name, center=center, convex=convex)
+        if parent.tag == "collision":
+            return _solid(part, element, parent, context, full)
+        mesh = context.resources.mesh(part, convex=False)
     except (Missing, Unusable) as error:
         word = AUTO if context.may_guess(uri) else ""
-        return Lost(element, uri, str(error), word, _times(own, scale), unreadable=isinstance(error, Unusable))
-    if convex:
-        context.note(
-            "replaced", element, f"'{uri}' by its convex hull; contact at the edges of hulls that are no boxes is rough"
-        )
-    elif mesh.simplified:
+        return Lost(element, uri, str(error), word, full, unreadable=isinstance(error, Unusable))
+    if mesh.simplified:
         context.note("replaced", element, f"'{uri}' by its convex hull, since it is too fine to be drawn")
-    return Placed(_scaled(mesh, _times(own, scale), element))
+    return Placed(_scaled(mesh, full, element))
+
+
+def _solid(part: MeshPart, element: Element, parent: Element, context: Context, scale: Vector) -> Placed:
+    """What collides in place of a mesh: its convex pieces, or its hull. Raises Missing, Unusable and UserError."""
+    hull = _scaled(context.resources.mesh(part, convex=True), scale, element)
+    most = _most_pieces(element, parent, context)
+    pieces = context.resources.pieces(part, scale, most) if most > 1 else []
+    if len(pieces) < 2:
+        context.note("replaced", element, f"'{part.uri}' by its convex hull; {ROUGH}")
+        return Placed(hull)
+    context.note("replaced", element, f"'{part.uri}' by {len(pieces)} convex pieces; {ROUGH}")
+    return Placed(hull, pieces=tuple(box_of(piece) or (piece, HERE) for piece in pieces))
+
+
+def _most_pieces(element: Element, parent: Element, context: Context) -> int:
+    """The maximum number of convex pieces of the `<mesh>` of a collision; 1 for its hull. Raises UserError."""
+    wanted = element.get("optimization", "")
+    if wanted == "convex_hull" or context.reading.mesh == "hull" or _is_turned(parent):
+        return 1
+    decomposition = element.find("convex_decomposition")
+    if wanted != "convex_decomposition" or decomposition is None:
+        return MOST_PIECES
+    return int(min(max(number(decomposition, "max_convex_hulls", DEFAULT_HULLS), 1), MOST_PIECES))
+
+
+def _is_turned(collision: Element) -> bool:
+    """Whether a joint turns the link of a `<collision>`: a wheel rolls on its hull, and what stands for it is found by that."""
+    link = collision.parent
+    if link is None or link.parent is None:
+        return False
+    joints = (joint for joint in link.parent.findall("joint") if joint.get("type") in ("revolute", "continuous"))
+    return any(text_of(joint.find("child")) == link.get("name") for joint in joints)
 
 
 def scaled(stand_in: Placed, scale: Vector, element: Element) -> Placed:

@@ -69,13 +69,10 @@ def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local:
     usual = WATER if inertial is None else read_density(inertial, WATER)
     collisions, density, visuals = [], [], []
     for item in items:
-        if item.element.tag == "collision":
-            placed = _settled(item, items, element, context)
-            if placed is not None and can_be_touched(item.element, context):
-                mu = read_friction(item.element, context)
-                place = pose @ item.pose @ placed.offset
-                collisions.append(Collision(name_of(item.element), placed.shape, place, mu))
-                density.append(read_density(item.element, usual))
+        if item.element.tag == "collision" and (placed := _settled(item, items, element, context)) is not None:
+            solids = _collisions(item, placed, pose, context)
+            collisions += solids
+            density += [read_density(item.element, usual)] * len(solids)
     inertia = read_inertia(element, pose, collisions, density, context) if moving else None
     kinematic = element.find("kinematic")
     if kinematic is not None and moving and truth(element, "kinematic", False):
@@ -96,6 +93,16 @@ class _Item:
     element: Element
     pose: Pose
     shape: Placed | Lost | None
+
+
+def _collisions(item: _Item, placed: Placed, pose: Pose, context: Context) -> list[Collision]:
+    """The shapes of a `<collision>` of the link at `pose`; none if nothing can touch it. Raises UserError."""
+    if not can_be_touched(item.element, context):
+        return []
+    mu = read_friction(item.element, context)
+    place = pose @ item.pose @ placed.offset
+    shapes = placed.pieces or [(placed.shape, HERE)]
+    return [Collision(name_of(item.element), shape, place @ offset, mu) for shape, offset in shapes]
 
 
 def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -> Placed | None:

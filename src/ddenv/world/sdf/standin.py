@@ -28,10 +28,14 @@ HOW = f"{', '.join(f'{kind}:{sizes}' for kind, sizes in SIZES.items())} (m), vis
 
 @dataclass(frozen=True)
 class Placed:
-    """A shape and where it is in the frame of its `<collision>` or `<visual>`, or of what it stands in for."""
+    """A shape and where it is in the frame of its `<collision>` or `<visual>`, or of what it stands in for.
+
+    `pieces` are the convex shapes that collide in place of a mesh that is not convex; none for any other shape.
+    """
 
     shape: Shape
     offset: Pose = HERE
+    pieces: tuple[tuple[Shape, Pose], ...] = ()
 
 
 # A shape, or a word: `visual` and `collision` are the box around these shapes of the link, `none` leaves it out, and `auto` guesses
