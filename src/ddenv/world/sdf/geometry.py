@@ -161,10 +161,13 @@ def _solid(part: MeshPart, element: Element, parent: Element, context: Context, 
     hull = _scaled(context.resources.mesh(part, convex=True), scale, element)
     most = _most_pieces(element, parent, context)
     pieces = context.resources.pieces(part, scale, most) if most > 1 else []
+    box = box_of(hull) if len(pieces) == 1 else None
+    if box is not None:
+        return Placed(*box)
     if len(pieces) < 2:
         context.note("replaced", element, f"'{part.uri}' by its convex hull; {ROUGH}")
         return Placed(hull)
-    context.note("replaced", element, f"'{part.uri}' by {len(pieces)} convex pieces; {ROUGH}")
+    context.note("replaced", element, f"'{part.uri}' by its convex pieces; {ROUGH}", f"{len(pieces)} pieces")
     return Placed(hull, pieces=tuple(box_of(piece) or (piece, HERE) for piece in pieces))
 
 
