@@ -132,7 +132,7 @@ def test_auto_leaves_what_is_there(read, tmp_path):
     world = read(lost("a.obj"), stand_ins={"*": "auto", "a.obj": "auto"})
     assert tuple(model_bounds(world.models[0])[1]) == (2, 2, 2)
     assert [note.why for note in world.notes] == [
-        "'a.obj' by its convex hull; contact at the edges of hulls that are no boxes is rough"
+        "'a.obj' by its convex hull; contact at the edges of those that are no boxes is rough"
     ]
 
 

@@ -8,8 +8,8 @@ import pytest
 import trimesh
 
 from ddenv.errors import UserError
-from ddenv.world.extent import shape_bounds
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Sphere
+from ddenv.world.extent import around, shape_bounds
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere
 from ddenv.world.pose import Pose
 from ddenv.world.sdf.geometry import DEFAULT_SIZES
 
@@ -76,18 +76,61 @@ def test_a_polyline_stands_on_its_frame_as_its_hull(read):
     assert "not convex" in world.notes[0].why
 
 
-def test_meshes_are_convex_hulls_where_they_collide_and_themselves_where_they_are_seen(read, tmp_path):
-    angle = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]])
-    mesh = _extruded(angle, 1.0)
-    mesh.export(tmp_path / "angle.obj")
-    geometry = "<mesh><uri>angle.obj</uri><scale>1 1 -2</scale></mesh>"
-    link = "<{0} name='c'><geometry>" + geometry + "</geometry></{0}>"
-    both = f"<model name='m'><static>1</static><link name='l'>{link.format('collision')}{link.format('visual')}</link></model>"
-    found = read(both).models[0].links[0]
-    hull, seen = found.collisions[0].shape, found.visuals[0].shape
-    assert isinstance(hull, Mesh)
-    assert trimesh.Trimesh(hull.vertices, hull.faces).volume == pytest.approx(7)
+@pytest.fixture
+def angle(tmp_path):
+    """An L of 1 m width and height, as a mesh that is mirrored and stretched downwards: collision and visual of a link."""
+    outline = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]])
+    _extruded(outline, 1.0).export(tmp_path / "angle.obj")
+
+    def link(inside="", attributes=""):
+        mesh = f"<mesh {attributes}><uri>angle.obj</uri><scale>1 1 -2</scale>{inside}</mesh>"
+        shown = "".join(f"<{tag} name='{tag}'><geometry>{mesh}</geometry></{tag}>" for tag in ("collision", "visual"))
+        return f"<link name='l'>{shown}</link>"
+
+    return link
+
+
+def test_meshes_are_convex_pieces_where_they_collide_and_themselves_where_they_are_seen(read, angle):
+    world = read(f"<model name='m'><static>1</static>{angle()}</model>")
+    found = world.models[0].links[0]
+    assert {one.shape.size for one in found.collisions} == {(2, 1, 2), (1, 1, 2)} or {
+        one.shape.size for one in found.collisions
+    } == {(1, 2, 2), (1, 1, 2)}
+    assert {one.name for one in found.collisions} == {"collision"}
+    low, high = around(shape_bounds(one.shape, one.pose) for one in found.collisions)
+    assert (low.tolist(), high.tolist()) == ([0, 0, -2], [2, 2, 0])
+    seen = found.visuals[0].shape
     assert trimesh.Trimesh(seen.vertices, seen.faces).volume == pytest.approx(6)
+    assert "by its convex pieces" in world.notes[0].why
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda angle: (angle(attributes="optimization='convex_hull'"), {}),
+        lambda angle: (angle(), {"mesh": "hull"}),
+        lambda angle: (
+            angle(
+                "<convex_decomposition><max_convex_hulls>1</max_convex_hulls></convex_decomposition>",
+                "optimization='convex_decomposition'",
+            ),
+            {},
+        ),
+        # What a joint turns rolls on its hull.
+        lambda angle: (
+            f"{angle()}<link name='k'/><joint name='j' type='continuous'><parent>k</parent><child>l</child>"
+            "<axis><xyz>0 0 1</xyz></axis></joint>",
+            {},
+        ),
+    ],
+    ids=["convex_hull", "reading", "one piece", "wheel"],
+)
+def test_a_mesh_is_its_hull_where_the_file_or_the_user_asks_for_that_or_where_it_is_a_wheel(read, angle, made):
+    inside, options = made(angle)
+    world = read(f"<model name='m'>{inside}</model>", **options)
+    [collision] = next(link for link in world.models[0].links if link.name == "l").collisions
+    hull = collision.shape
+    assert trimesh.Trimesh(hull.vertices, hull.faces).volume == pytest.approx(7)
     assert hull.vertices[:, 2].min() == pytest.approx(-2)
 
 

@@ -15,8 +15,10 @@ from itertools import count
 import numpy as np
 import trimesh
 from manifold3d import CrossSection, FillRule, Manifold, Mesh64, OpType
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import breadth_first_order
 
-from ddenv.arrays import Floats, Integers
+from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.world.access import Unusable
 from ddenv.world.files.meshes import Surface, convex_hull, pack_pieces, surface_of
 from ddenv.world.files.triangles import Part
@@ -35,6 +37,7 @@ MOST_PLATES = 256  # of one part; of a part with more flat areas patches are tak
 MOST_PATCHES = 128  # of one mesh
 PLATE = 0.01  # the thickness of what stands for a flat area without a solid below it, m
 CONCAVE = 1e-6  # how far a face rises above its neighbour at a concave edge, as a share of the size
+BEYOND = 1e-7  # how far beyond a face a cut is, as a share of the size
 # The planes that are tried for a cut: fewer for finer parts, since each cut of these takes longer.
 MOST_PLANES = 40
 FEWEST_PLANES = 6
@@ -56,7 +59,7 @@ def build_pieces(parts: list[Part], submesh: str, center: bool, scale: Vector, m
 
 def convex_pieces(vertices: Floats, faces: Integers, most: int) -> list[Surface]:
     """The convex pieces of a mesh, at most `most`, in m; a single one is its hull. Raises ValueError if there is no hull."""
-    whole = convex_hull(vertices)
+    whole = convex_hull(vertices[np.unique(faces)])
     parts = _parts(vertices, faces)
     solids: list[Manifold] = []
     uneven: list[Floats] = []
@@ -70,7 +73,8 @@ def convex_pieces(vertices: Floats, faces: Integers, most: int) -> list[Surface]
             uneven.append(part.triangles)
     patches = _patches(uneven, MOST_PATCHES)
     little = min(LITTLE, LITTLE_SHARE * trimesh.Trimesh(*whole, process=False).volume)
-    pieces = [_surface(hull) for hull in _cut(solids, most - len(patches), little)]
+    hulls = (_rounded(hull) for hull in _cut(solids, most - len(patches), little))
+    pieces = [_surface(hull) for hull in hulls if not hull.is_empty()]
     pieces += [convex_hull(corners) for corners in patches]
     return pieces if 1 < len(pieces) <= most else [whole]
 
@@ -89,15 +93,43 @@ def _parts(vertices: Floats, faces: Integers) -> list[trimesh.Trimesh]:
 
 
 def solid_of(part: trimesh.Trimesh) -> Manifold | None:
-    """What a closed surface encloses; None if it is not closed, or encloses nothing."""
+    """What a closed, connected surface encloses; None if it is not closed, or encloses nothing."""
+    faces = part.faces if _is_closed(part.faces) else _wound_alike(part)
     # Of what is not closed Manifold only says so, or reads memory that it does not own.
-    if not (part.is_watertight and part.is_winding_consistent):
+    if not _is_closed(faces):
         return None
-    inside_out = part.volume < 0
-    faces = part.faces[:, ::-1] if inside_out else part.faces
-    mesh = Mesh64(np.ascontiguousarray(part.vertices), np.ascontiguousarray(faces, dtype=np.uint64))
-    solid = Manifold(mesh)
+    if trimesh.Trimesh(part.vertices, faces, process=False).volume < 0:
+        faces = faces[:, ::-1]
+    solid = Manifold(Mesh64(np.ascontiguousarray(part.vertices), np.ascontiguousarray(faces, dtype=np.uint64)))
     return solid if solid.volume() > SMALLEST else None
+
+
+def _is_closed(faces: Integers) -> bool:
+    """Whether along each edge as many faces run one way as the other."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    back = edges[:, ::-1]
+    return np.array_equal(edges[np.lexsort(edges.T)], back[np.lexsort(back.T)])
+
+
+def _wound_alike(part: trimesh.Trimesh) -> Integers:
+    """The faces of `part`, each turned so that it runs along an edge in the other direction than its neighbour there."""
+    first, second = part.face_adjacency.T
+    edges = part.face_adjacency_edges
+    alike = _runs_along(part.faces[first], edges) == _runs_along(part.faces[second], edges)
+    neighbours = coo_matrix((np.where(alike, 2, 1), (first, second)), shape=(len(part.faces), len(part.faces))).tocsr()
+    neighbours = neighbours + neighbours.T
+    order, before = breadth_first_order(neighbours, 0)
+    turned = np.zeros(len(part.faces), dtype=bool)
+    for face in order[1:]:
+        turned[face] = turned[before[face]] ^ (neighbours[before[face], face] == 2)
+    return np.where(turned[:, None], part.faces[:, ::-1], part.faces)
+
+
+def _runs_along(faces: Integers, edges: Integers) -> Booleans:
+    """Whether each of `faces` (N, 3) has its own one of `edges` (N, 2) from start to end, not from end to start."""
+    after = np.roll(faces, -1, axis=1)
+    along: Booleans = ((faces == edges[:, :1]) & (after == edges[:, 1:])).any(axis=1)
+    return along
 
 
 def flat_areas(part: trimesh.Trimesh) -> list[Integers]:
@@ -209,12 +241,18 @@ def _planes(solid: Manifold) -> list[tuple[Floats, float]]:
     first[same.reshape(-1)[::-1]] = np.arange(len(sides))[::-1]
     most = int(np.clip(CHECKED_TRIANGLES / len(faces), FEWEST_PLANES, MOST_PLANES))
     chosen = first[np.argsort(-total, kind="stable")[:most]]
-    return [(sides[number], float(heights[number])) for number in chosen]
+    # Just beyond the face: a cut in its own plane could leave what it parts joined by triangles without area.
+    return [(sides[number], float(heights[number] + BEYOND * size)) for number in chosen]
+
+
+def _rounded(hull: Manifold) -> Manifold:
+    """`hull` without the tiny edges that cuts beyond faces leave."""
+    low, high = np.reshape(hull.bounding_box(), (2, 3))
+    return hull.simplify(WELD * float((high - low).max()))
 
 
 def _surface(hull: Manifold) -> Surface:
-    mesh = hull.to_mesh64()
-    return convex_hull(np.asarray(mesh.vert_properties)[:, :3])
+    return convex_hull(np.asarray(hull.to_mesh64().vert_properties)[:, :3])
 
 
 def _patches(parts: Iterable[Floats], most: int) -> list[Floats]:
