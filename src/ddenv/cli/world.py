@@ -9,6 +9,7 @@ import shutil
 import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,6 +82,7 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 def world_report(world: World) -> Data:
     """Everything of the table and more; lengths in m, angles in rad."""
     from ddenv.world.extent import model_bounds
+    from ddenv.world.floor_error import floor_errors
     from ddenv.world.placement import inside
     from ddenv.world.sdf.official import refused
 
@@ -113,6 +115,7 @@ def world_report(world: World) -> Data:
         "models": models,
         "notes": _notes(world, *({note.model for note in world.notes} - {model.name for model in world.models})),
         "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
+        "pieces": [asdict(error) for error in floor_errors(world.models)],
         "refused": [{"why": why, "place": place} for why, place in refused(world)],
         "files": [{"uri": file.uri, "path": str(file.path), "from": file.source} for file in world.found],
         "absent": list(world.absent),
@@ -144,6 +147,7 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
 
     No line is wider than `columns`: first some columns go, then cells have more lines, or less words.
     """
+    from ddenv.world.floor_error import note_pieces
     from ddenv.world.placement import note_inside, note_unseen
     from ddenv.world.sdf.official import refused
 
@@ -162,7 +166,7 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
     places: dict[str, list[str]] = {}
     for why, place in refused(world):
         places.setdefault(why, []).append(place)
-    remarks = (*note_inside(world), *note_unseen(world, world.elements()))
+    remarks = (*note_inside(world), *note_unseen(world, world.elements()), *note_pieces(world, world.names))
     wrong = [words for _, words in remarks]
     for why, at in places.items():
         more = f", and {len(at) - 1} more" if len(at) > 1 else ""

@@ -18,7 +18,7 @@ from ddenv.runs.folder import named, named_file
 from ddenv.runs.remedies import REMEDIES, remembered, with_remedies
 from ddenv.runs.remembered import state_file
 from ddenv.schemas import nearest
-from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put, read
+from ddenv.settings import SETTINGS, Ignorable, MeshReading, Value, number_text, put, read
 from ddenv.text import Data, Names, first_of, shortened
 from ddenv.world.access import MissingFiles, is_read_as_world, read_bytes, resolved, write_file
 from ddenv.world.command import command_words
@@ -37,7 +37,7 @@ Fetch = Callable[[Path, Reading], None]
 # Prefix of the names of documents in a run file that hold other files.
 RESOURCE = "resource "
 # The options on how a world is read.
-READING = ("model_path", "stand_in", "ignore", "inside")
+READING = ("model_path", "stand_in", "ignore", "inside", "mesh")
 # Maximum number of remembered remedies that a line names, and the maximum width of each in cells.
 NAMED, LONGEST = 3, 60
 
@@ -130,8 +130,12 @@ def reading_of(
     stand_in: Sequence[str] = (),
     ignore: Sequence[Ignorable] = (),
     inside: bool | None = None,
+    mesh: MeshReading | None = None,
 ) -> Reading:
-    """`reading` with more folders (searched first), stand-ins (`URI=SHAPE`), ignored elements and `inside`. Raises UserError."""
+    """`reading` with more folders (searched first), stand-ins (`URI=SHAPE`), ignored elements, `inside` and `mesh`.
+
+    Raises UserError.
+    """
     for folder in model_path:
         if not folder.is_dir():
             raise UserError(f"--model-path: there is no folder {folder}")
@@ -139,7 +143,13 @@ def reading_of(
     stand_ins = reading.stand_ins | dict(parse_option(option) for option in stand_in)
     ignored = dict.fromkeys((*reading.ignore, *ignore))
     within = reading.inside or bool(inside)
-    return Reading(model_path=folders, stand_ins=stand_ins, ignore=tuple(ignored), inside=within)
+    return Reading(
+        model_path=folders,
+        stand_ins=stand_ins,
+        ignore=tuple(ignored),
+        inside=within,
+        mesh=mesh or reading.mesh,
+    )
 
 
 def with_remembered(world: Path, reading: Reading, announce: Announce | None = None) -> Reading:

@@ -76,16 +76,26 @@ Shape = Box | Cylinder | Sphere | Plane | Capsule | Ellipsoid | Mesh
 
 
 @dataclass(frozen=True, slots=True)
+class Piece:
+    """A convex piece of `mesh`, which is not convex, and its `pose` in the frame of that."""
+
+    mesh: Mesh
+    pose: Pose
+
+
+@dataclass(frozen=True, slots=True)
 class Collision:
     """`mu` is the Coulomb friction coefficient: the smaller of SDF's `ode/mu` and `ode/mu2`.
 
-    The pieces of a mesh that is not convex follow each other in their link, all with the `name` of their `<collision>`.
+    The pieces of a mesh that is not convex follow each other in their link, all with the `name` of their `<collision>`;
+    `piece` says what they are pieces of.
     """
 
     name: str
     shape: Shape
     pose: Pose
     mu: float
+    piece: Piece | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)

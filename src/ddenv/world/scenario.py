@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 from hashlib import blake2b
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
 from ddenv import settings
-from ddenv.settings import FARTHEST, TURNS, Ignorable
+from ddenv.settings import FARTHEST, TURNS, Ignorable, MeshReading
 from ddenv.text import Data, Names
 
 # Maximum of all other numbers.
@@ -55,7 +55,7 @@ class Reading(Section):
     stand_ins: dict[str, str] = {}
     ignore: tuple[Ignorable, ...] = ()
     inside: bool = False
-    mesh: Literal["pieces", "hull"] = "pieces"
+    mesh: MeshReading = "pieces"
 
 
 PLAIN = Reading()

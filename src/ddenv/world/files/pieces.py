@@ -60,7 +60,7 @@ def build_pieces(parts: list[Part], submesh: str, center: bool, scale: Vector, m
 def convex_pieces(vertices: Floats, faces: Integers, most: int) -> list[Surface]:
     """The convex pieces of a mesh, at most `most`, in m; a single one is its hull. Raises ValueError if there is no hull."""
     whole = convex_hull(vertices[np.unique(faces)])
-    parts = _parts(vertices, faces)
+    parts = connected_parts(vertices, faces)
     solids: list[Manifold] = []
     uneven: list[Floats] = []
     for part in parts:
@@ -79,7 +79,7 @@ def convex_pieces(vertices: Floats, faces: Integers, most: int) -> list[Surface]
     return pieces if 1 < len(pieces) <= most else [whole]
 
 
-def _parts(vertices: Floats, faces: Integers) -> list[trimesh.Trimesh]:
+def connected_parts(vertices: Floats, faces: Integers) -> list[trimesh.Trimesh]:
     """The connected parts of a mesh, without triangles that have no area, or stand twice."""
     size = max(float(np.ptp(vertices, axis=0).max()), 1e-12)
     places = np.round(vertices / (WELD * size)).astype(np.int64)

@@ -158,17 +158,18 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
 
 def _solid(part: MeshPart, element: Element, parent: Element, context: Context, scale: Vector) -> Placed:
     """What collides in place of a mesh: its convex pieces, or its hull. Raises Missing, Unusable and UserError."""
-    hull = _scaled(context.resources.mesh(part, convex=True), scale, element)
+    mesh = context.resources.mesh(part, convex=True)
+    hull = _scaled(mesh, scale, element)
     most = _most_pieces(element, parent, context)
     pieces = context.resources.pieces(part, scale, most) if most > 1 else []
-    box = box_of(hull) if len(pieces) == 1 else None
-    if box is not None:
+    if len(pieces) == 1 and isinstance(hull, Mesh) and (box := box_of(hull)) is not None:
         return Placed(*box)
     if len(pieces) < 2:
         context.note("replaced", element, f"'{part.uri}' by its convex hull; {ROUGH}")
         return Placed(hull)
     context.note("replaced", element, f"'{part.uri}' by its convex pieces; {ROUGH}", f"{len(pieces)} pieces")
-    return Placed(hull, pieces=tuple(box_of(piece) or (piece, HERE) for piece in pieces))
+    whole = _scaled(context.resources.mesh(part, convex=False), scale, element)
+    return Placed(whole, pieces=tuple(box_of(piece) or (piece, HERE) for piece in pieces))
 
 
 def _most_pieces(element: Element, parent: Element, context: Context) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.world.extent import around, shape_bounds
-from ddenv.world.model import Box, Collision, Link, Visual
+from ddenv.world.model import Box, Collision, Link, Mesh, Piece, Visual
 from ddenv.world.pose import HERE, Pose, vector
 from ddenv.world.sdf.context import Context, note_unread
 from ddenv.world.sdf.frames import pose_of
@@ -101,8 +101,10 @@ def _collisions(item: _Item, placed: Placed, pose: Pose, context: Context) -> li
         return []
     mu = read_friction(item.element, context)
     place = pose @ item.pose @ placed.offset
-    shapes = placed.pieces or [(placed.shape, HERE)]
-    return [Collision(name_of(item.element), shape, place @ offset, mu) for shape, offset in shapes]
+    name = name_of(item.element)
+    if not isinstance(placed.shape, Mesh) or not placed.pieces:
+        return [Collision(name, placed.shape, place, mu)]
+    return [Collision(name, shape, place @ offset, mu, Piece(placed.shape, offset)) for shape, offset in placed.pieces]
 
 
 def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -> Placed | None:

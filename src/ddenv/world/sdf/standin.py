@@ -30,7 +30,7 @@ HOW = f"{', '.join(f'{kind}:{sizes}' for kind, sizes in SIZES.items())} (m), vis
 class Placed:
     """A shape and where it is in the frame of its `<collision>` or `<visual>`, or of what it stands in for.
 
-    `pieces` are the convex shapes that collide in place of a mesh that is not convex; none for any other shape.
+    `pieces` are the convex shapes that collide in place of `shape` if that is a mesh that is not convex; none for any other.
     """
 
     shape: Shape
