@@ -82,7 +82,7 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 def world_report(world: World) -> Data:
     """Everything of the table and more; lengths in m, angles in rad."""
     from ddenv.world.extent import model_bounds
-    from ddenv.world.floor_error import floor_errors
+    from ddenv.world.files.floor_error import floor_errors
     from ddenv.world.placement import inside
     from ddenv.world.sdf.official import refused
 
@@ -147,7 +147,7 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
 
     No line is wider than `columns`: first some columns go, then cells have more lines, or less words.
     """
-    from ddenv.world.floor_error import note_pieces
+    from ddenv.world.files.floor_error import note_pieces
     from ddenv.world.placement import note_inside, note_unseen
     from ddenv.world.sdf.official import refused
 

@@ -42,7 +42,7 @@ from ddenv.runs.tests_left import search_tests
 from ddenv.schemas import split_pair
 from ddenv.text import count
 from ddenv.words.claims import verdict_on
-from ddenv.world.floor_error import note_pieces
+from ddenv.world.files.floor_error import note_pieces
 from ddenv.world.model import World
 from ddenv.world.placement import note_unseen
 from ddenv.world.scenario import Reduction, Scenario

@@ -42,13 +42,13 @@ class FloorError:
 
 def floor_errors(models: Iterable[Model]) -> Iterator[FloorError]:
     """The errors of all meshes of `models` that are cut into pieces, and reach the heights of a robot."""
-    for model, link in ((model, link) for model in models for link in model.links):
+    for owner, link in ((model, link) for model in models for link in model.links):
         cut = (one for one in link.collisions if one.piece is not None)
         for (mesh, _), group in groupby(cut, key=lambda one: (one.piece and one.piece.mesh, one.name)):
             pieces = list(group)
             # Of a finer mesh only the hull is known.
             if mesh is not None and not mesh.simplified:
-                yield from _error(model.name, mesh, pieces)
+                yield from _error(owner.name, mesh, pieces)
 
 
 def _error(model: str, mesh: Mesh, pieces: list[Collision]) -> Iterator[FloorError]:
