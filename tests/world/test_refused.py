@@ -152,9 +152,21 @@ def on_frame_a(*others: str) -> bytes:
     return world(f"{''.join(others)}<model name='m'><pose relative_to='a'>0 0 0 0 0 0</pose>{LINK}</model>")
 
 
+def populated(distribution: str) -> bytes:
+    return world(f"<population><model name='k'>{LINK}</model><distribution>{distribution}</distribution></population>")
+
+
 # These point at the element.
 AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
-    "`<population>`": {"<population> is not supported; write its models out": [world("<population name='p'/>")]},
+    "a `<population>` whose": {
+        "only Gazebo Classic knows the places of a 'uniform' distribution; .* --ignore population": [
+            populated("<type>uniform</type>")
+        ],
+        "/population: has no distribution/step": [populated("<type>grid</type><rows>1</rows><cols>1</cols>")],
+        "/population: must stand for 1 to 50000 models: see distribution/cols and distribution/rows": [
+            populated(f"<type>grid</type><rows>1</rows>{cols}") for cols in ("", "<cols>0</cols>", "<cols>1e9</cols>")
+        ],
+    },
     "`<joint>` between models": {"joints between models are not supported": [world("<joint name='j' type='fixed'/>")]},
     "a second `<state>`": {
         "/state: a second <state>; a world may have only one": [world("<state/><state/>")],
