@@ -213,7 +213,7 @@ def test_gravity_of_old_and_new_files(read):
 
 def test_all_files_that_are_nowhere_are_told_at_once(read):
     mesh = "<collision name='c'><geometry><mesh><uri>model://lamp/lamp.dae</uri></mesh></geometry></collision>"
-    with pytest.raises(UserError, match=r"'model://table' was not found .*; also missing: 'model://lamp/lamp.dae'$"):
+    with pytest.raises(UserError, match=r"'model://table' was not found: .*; also missing: 'model://lamp/lamp.dae'$"):
         read(included() + included() + f"<model name='lamp'><static>1</static><link name='l'>{mesh}</link></model>")
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
+from ddenv.errors import UserError
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.files.resources import FOLDER
 from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
@@ -91,7 +92,9 @@ def _last_of(uri: str) -> str:
 
 
 def _root(include: Element, uri: str, context: Context) -> Element | None:
-    """The root of the included file; None if it is missing (noted or remembered in `context`)."""
+    """The root of the included file; None if it is missing or broken (noted or remembered in `context`)."""
+    if uri in context.missing:
+        return None
     given = context.stand_in(uri)
     if given is not None and given[1] == NONE:
         context.note("ignored", include, f"'{uri}' is left out as asked")
@@ -104,25 +107,29 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
         if root.source.parent == FOLDER and root.find("model") is not None:
             _note_replaced(include, uri, "the one built into ddenv, which is like Gazebo's", context)
         return root
-    except Unusable as error:
-        raise complain(include, f"'{uri[:200]}' cannot be included: {error}") from None
-    except Missing as missing:
+    except (Missing, Unusable, UserError) as error:
         if context.may_guess(uri):
             return _guessed_root(include, uri, context)
+        is_missing = isinstance(error, Missing)
+        problem = "was not found" if is_missing else "cannot be included"
+        why = f"'{uri[:200]}' {problem}: {error}"
         if context.ignores("include"):
-            context.note("ignored", include, f"'{uri}' was not found: {missing}")
+            context.note("ignored", include, why)
             return None
+        # Another folder would not help if the file is there.
+        folder = "its folder with --model-path, " if is_missing else ""
         remedies = (
-            f"give its folder with --model-path, a shape for it with --stand-in '{uri[:200]}=box:1,1,1' (m; or cylinder, "
-            "sphere, ...), have one guessed with --stand-in auto, or leave it out with --ignore include"
+            f"give {folder}a shape for it with --stand-in '{uri[:200]}=box:1,1,1' (m; or cylinder, sphere, ...), "
+            "have one guessed with --stand-in auto, or leave it out with --ignore include"
         )
-        why = f"'{uri[:200]}' was not found ({missing}); {remedies}"
-        context.missing.setdefault(uri, complain(include, why))
+        if not is_missing:
+            context.unreadable[uri] = str(error)
+        context.missing.setdefault(uri, complain(include, f"{why}; {remedies}"))
         return None
 
 
 def _file_root(include: Element, uri: str, context: Context) -> Element:
-    """The root of the file that `uri` names. Raises Missing and Unusable."""
+    """The root of the file that `uri` names. Raises Missing, Unusable and UserError."""
     path, text = context.resources.sdf(uri, include.source.parent)
     if path in context.files:
         return context.files[path]
