@@ -52,14 +52,14 @@ def world_command() -> None:
 def _read(file: Path, options: Data) -> tuple[World, Reading]:
     """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
     from ddenv.runs.subject import reading_of, with_remembered, world_of
-    from ddenv.world.sdf.read import read_world
+    from ddenv.world.sdf.read import parse_world, read_world
 
     file, own = world_of(file)
     fetch: Fetch | None = options.pop("fetch")
     reads_remembered = options.pop("remembered")
     read_as = reading_of(own, **options)
     if fetch is not None:
-        fetch(file, read_as)
+        fetch(file, read_as, parse_world)
     if reads_remembered:
         read_as = with_remembered(file, read_as, announce)
     return read_world(file, read_as), read_as

@@ -140,7 +140,10 @@ async def test_elements_that_are_not_supported_are_left_out_once_the_user_says_s
 async def test_files_that_were_found_and_cannot_be_used_say_why_and_have_the_same_remedies(tmp_path):
     (tmp_path / "barrel.dae").write_text("<COLLADA><")
     models = tmp_path / "models"
-    for name, content in {"rack": "<sdf version='1.6'><model", "keg": barrel("keg", 2).replace(BARREL, "keg.dae")}.items():
+    for name, content in {
+        "rack": "<sdf version='1.6'><model",
+        "keg": barrel("keg", 2).replace(BARREL, "keg.dae"),
+    }.items():
         (models / name).mkdir(parents=True)
         (models / name / "model.sdf").write_text(content if name == "rack" else f"<sdf version='1.6'>{content}</sdf>")
     (models / "keg" / "keg.dae").write_text("<COLLADA><")
@@ -215,7 +218,7 @@ async def test_models_come_from_fuel_unless_the_user_stops_that(depot, tmp_path,
         assert ends == ["stopped", "came", "came"]
         assert shape(session, "crate") == Box((2, 1, 1))
         (failed,) = [each.message for each in session.app._notifications]
-        assert "Lamp cannot be fetched: is not in Fuel" in failed
+        assert failed.endswith("Lamp cannot be fetched: is not in Fuel; w leaves it out")
         await session.press("m", "home", "down", "w")
         assert rows(session)[1] == "✓ Lamp  left out"
 
