@@ -1,4 +1,4 @@
-"""Downloads the models in Gazebo Fuel that a world or a robot needs and that are not on this machine, where the user asks for it."""
+"""Downloads the models in Gazebo Fuel that a world or a robot needs and that are not here, where the user asks for it."""
 
 from __future__ import annotations
 

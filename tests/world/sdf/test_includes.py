@@ -288,3 +288,14 @@ def test_a_model_of_which_all_is_left_out_is_left_out(read):
     assert "all that it includes is left out" in [note.why for note in world.notes if note.model == "wall"]
     with pytest.raises(UserError, match="has no <link>"):
         read("<model name='m'><plugin name='p' filename='f'/></model>")
+
+
+def test_actors_are_not_simulated_and_nothing_else_is_said_of_them(read, table):
+    (table / "table" / "model.sdf").write_text("<sdf version='1.6'><actor name='walker'/></sdf>")
+    # An actor may have links, which could be touched.
+    world = read(f"{included()}<actor name='a'><link name='l'>{BOX}</link></actor>", model_path=(table,))
+    assert world.models == ()
+    assert [(note.what, note.why) for note in world.notes] == [
+        ("<actor>", "actors are not simulated"),
+        ("<include>", "actors are not simulated"),
+    ]

@@ -51,7 +51,7 @@ ONCE |= {"axis", "axis2", "parent", "child", "limit"}
 REASONS = {
     "plugin": "plugins are not run",
     "sensor": "only the robot's own sensors are simulated",
-    "actor": "nothing can touch it",
+    "actor": "actors are not simulated",
     "road": "it is not drawn",
     "wind": "wind is not simulated",
     "enable_wind": "wind is not simulated",

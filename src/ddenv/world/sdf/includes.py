@@ -9,14 +9,14 @@ from urllib.parse import unquote
 from ddenv.errors import UserError
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.files.resources import FOLDER
-from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
+from ddenv.world.sdf.context import REASONS, Context, note_unread, refuse, sdf_root
 from ddenv.world.sdf.standin import NO_FLOOR, NONE, SIZES, StandIn, guess
 from ddenv.world.sdf.urdf import root_of
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
 from ddenv.world.write import primitive
 
-# Intangible things that an included file may hold in place of a model.
-UNTOUCHABLE = ("actor", "light")
+# What an included file may hold in place of a model, with the note.
+NO_MODELS = {"actor": REASONS["actor"], "light": "nothing can touch it"}
 # Prefix of the made-up file names of stand-ins.
 STAND_IN = "stand-in "
 
@@ -72,8 +72,9 @@ def included(include: Element, files: tuple[Path, ...], context: Context) -> Par
         chain = " includes ".join(path.name for path in (*files[files.index(root.source) :], root.source))
         raise complain(include, f"the includes form a cycle: {chain}")
     models = root.findall("model")
-    if not models and any(root.find(tag) is not None for tag in UNTOUCHABLE):
-        context.note("ignored", include, "nothing can touch it")
+    instead = [why for tag, why in NO_MODELS.items() if root.find(tag) is not None]
+    if instead and not models:
+        context.note("ignored", include, instead[0])
         return None
     if len(models) != 1:
         found = f"{len(models)} <model> elements" if models else "no <model>"
