@@ -10,7 +10,7 @@ import numpy as np
 
 from ddenv.world.pose import Vector
 from ddenv.world.sdf.context import MOST_MODELS, Context, refuse
-from ddenv.world.sdf.frames import pose_of
+from ddenv.world.sdf.frames import FARTHEST, pose_of
 from ddenv.world.sdf.includes import Part
 from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, parse, text_of
 
@@ -44,12 +44,16 @@ def _places(population: Element) -> list[Vector]:
     given = COUNTS[kind]
     counts = [int(number(population, path, 0)) if path else 1 for path in given]
     if min(counts) < 1 or math.prod(counts) > MOST_MODELS:
-        raise complain(population, f"must stand for 1 to {MOST_MODELS} models: see {' and '.join(filter(None, given))}")
-    if kind == "grid":
-        step = np.array(numbers(_child(population, "distribution/step"), 3))
+        raise complain(population, f"must stand for 1 to {MOST_MODELS} models; see its rows and cols, or model_count")
+    is_grid = kind == "grid"
+    lengths = _child(population, "distribution/step" if is_grid else "box/size")
+    size = step = np.array(numbers(lengths, 3))
+    least = -FARTHEST if is_grid else 0.0
+    if not least < step.min() <= step.max() < FARTHEST:
+        raise complain(lengths, f"must be between {least:g} and {FARTHEST:g} m")
+    if is_grid:
         size = step * np.subtract(counts, 1)
     else:
-        size = np.array(numbers(_child(population, "box/size"), 3))
         step = size / counts
     first = np.where(given, 0, size / 2)
     indices = [index[::-1] for index in np.ndindex(*reversed(counts))]
