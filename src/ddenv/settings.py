@@ -18,7 +18,7 @@ Value = int | float | str | bool | None
 FARTHEST, TURNS = 1e6, 1e3
 
 # Kinds of elements that the user can have skipped instead of refusing the world.
-Ignorable = Literal["heightmap", "image", "mesh", "include", "joint"]
+Ignorable = Literal["heightmap", "image", "mesh", "include", "joint", "population"]
 IGNORABLE: tuple[str, ...] = get_args(Ignorable)
 # What collides in place of a mesh that is not convex.
 MeshReading = Literal["pieces", "hull"]

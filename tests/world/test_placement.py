@@ -295,3 +295,13 @@ def test_what_can_be_hit_where_nothing_is_seen_is_named():
     ]
     assert list(note_unseen(seen_as(0.05), ("post",))) == []
     assert "models without a visual, which can be hit but not seen: odd" in world_lines(seen_as())
+
+
+@pytest.mark.parametrize(("height", "named"), [(1.0, ["sheet"]), (0.01, [])])
+def test_what_is_seen_and_cannot_be_hit_is_named_unless_it_is_flat(height, named):
+    drawn = f"<visual name='v'><geometry><box><size>1 1 {height}</size></box></geometry></visual>"
+    sheet = f"<model name='sheet'><static>1</static><link name='l'>{drawn}</link></model>"
+    text = seen_as(1.0).text.replace(b"</world>", f"{sheet}</world>".encode())
+    notes = list(note_unseen(parse_world(text, Path("w.sdf")), ("post", "odd", "sheet")))
+    words = "models without a collision, which can be seen but not hit"
+    assert notes == [("passable", f"{words}: {name}") for name in named]

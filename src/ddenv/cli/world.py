@@ -53,14 +53,14 @@ def world_command() -> None:
 def _read(file: Path, options: Data) -> tuple[World, Reading]:
     """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
     from ddenv.runs.subject import reading_of, with_remembered, world_of
-    from ddenv.world.sdf.read import read_world
+    from ddenv.world.sdf.read import parse_world, read_world
 
     file, own = world_of(file)
     fetch: Fetch | None = options.pop("fetch")
     reads_remembered = options.pop("remembered")
     read_as = reading_of(own, **options)
     if fetch is not None:
-        fetch(file, read_as)
+        fetch(file, read_as, parse_world)
     if reads_remembered:
         read_as = with_remembered(file, read_as, announce)
     return read_world(file, read_as), read_as
@@ -260,7 +260,7 @@ def _totals(world: World) -> str:
     said = [f"{kinds[kind]} {kind}" for kind in ("replaced", "ignored") if kinds[kind]]
     stay = [shortened(model.name, LONGEST_NAME) for model in world.models if model.name in world.anchors]
     they, them = ("1 stays", "it") if len(stay) == 1 else (f"{len(stay)} stay", "them")
-    why = f"; {they} because others are placed relative to {them}: {first_of(stay, MOST_NAMES)}" if stay else ""
+    why = f"; {they} because others depend on {them}: {first_of(stay, MOST_NAMES)}" if stay else ""
     welds = [f"{shortened(one, LONGEST_NAME)} to {shortened(other, LONGEST_NAME)}" for one, other in world.ties]
     why += f"; welded, so they are removed together: {first_of(welds, MOST_NAMES)}" if welds else ""
     models = f"{count(len(world.models), 'model')}, {len(world.elements())} can be removed{why}"
@@ -394,6 +394,6 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
     far = f", {farthest} farthest, by {ways[farthest]:.3f} m" if farthest else ""
     print(printable(f"wrote {output}: {count(len(ways), 'model')} moved within {settled.seconds:.1f} s{far}"))
     if stay:
-        why = "their parts move, or others are placed relative to them"
+        why = "their parts move, or others depend on them"
         print(printable(f"not moved: {first_of(stay, MOST_NAMES)}: {why}"))
     return 0

@@ -32,8 +32,10 @@ from ddenv.world.sdf.read import disk_of, parse_model, parse_world, read_model, 
 from ddenv.world.sdf.standin import AUTO, NONE, parse_option
 
 Announce = Callable[[str], None]
-# Downloads what a world lacks, which is read in this way.
-Fetch = Callable[[Path, Reading], None]
+# Reads the content of a file.
+Parse = Callable[[bytes, Path, Reading, Resources], object]
+# Downloads what a file lacks, which is read in this way.
+Fetch = Callable[[Path, Reading, Parse], None]
 # Prefix of the names of documents in a run file that hold other files.
 RESOURCE = "resource "
 # The options on how a world is read.
@@ -107,7 +109,8 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
     read_as = reading_of(scenario.reading, **reading)
     scenario = with_options(scenario, reading=read_as, **others)
     if fetch is not None:
-        fetch(scenario.world, read_as)
+        fetch(scenario.world, read_as, parse_world)
+        fetch(scenario.robot.model, read_as, parse_model)
     if reads_remembered:
         read_as = with_remembered(scenario.world, read_as, announce)
         scenario = scenario.model_copy(update={"reading": read_as})

@@ -249,8 +249,9 @@ class Shared:
 class World:
     """An SDF world. `text` is the file's content; `models` are in the file's order; `gravity` is in m/s^2.
 
-    `anchors` names the models that others are placed relative to: without them the file would be invalid. `resources` holds
-    everything read from other files (`ddenv.world.files.resources`), so that `text` can be read again without them.
+    `anchors` names the models that others depend on, which always stay: others are placed relative to them, or are copies of the
+    same text. `resources` holds everything read from other files (`ddenv.world.files.resources`), so that `text` can be read again
+    without them.
     `ties` has (model, other) where a model is welded to another and so cannot stay without it. `shared` has byte ranges of `text`
     that go when several models are gone. `found` are the other files that were read from disk, `absent` the URIs without one.
     `guessed` has (model, URI) where a shape of the model is a guess.

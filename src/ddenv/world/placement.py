@@ -23,6 +23,11 @@ TOLERANCE = 0.02
 LARGER = 3.0
 # What is seen of a thin sheet counts as so wide, m.
 THIN = 0.05
+UNLIKE = {
+    "unseen": "models without a visual, which can be hit but not seen",
+    "passable": "models without a collision, which can be seen but not hit",
+    "larger": f"models whose collision is more than {LARGER:g} times as wide as what is seen",
+}
 # A line names so many models.
 MOST_NAMES = 3
 # The steps in which a free place is looked for, and how far, m.
@@ -188,30 +193,35 @@ def note_inside(world: World) -> Iterator[tuple[str, str]]:
 
 
 def note_unseen(world: World, among: Collection[str]) -> Iterator[tuple[str, str]]:
-    """What `among` these models the robot may hit where nothing is seen. A world without any visual is not made to be looked at."""
+    """What `among` these models the robot may hit where nothing is seen, or not hit where something is.
+
+    A world without any visual is not made to be looked at.
+    """
     if not any(link.visuals for model in world.models for link in model.links):
         return
     # A visual that was not read may be there.
     unread = {note.model for note in world.notes if note.kind == "ignored"}
-    unseen: list[str] = []
-    larger: list[str] = []
-    for model in world.models:
-        hit = model_bounds(model)
-        if hit is None or model.name not in among or model.name in unread:
-            continue
-        visuals = (visual for link in model.links for visual in link.visuals)
-        seen = around(shape_bounds(visual.shape, visual.pose) for visual in visuals)
-        if seen is None:
-            unseen.append(model.name)
-        elif ((hit[1] - hit[0])[:2] > LARGER * np.maximum(seen[1] - seen[0], THIN)[:2]).any():
-            larger.append(model.name)
-    if unseen:
-        yield "unseen", f"models without a visual, which can be hit but not seen: {first_of(unseen, MOST_NAMES)}"
-    if larger:
-        yield (
-            "larger",
-            f"models whose collision is more than {LARGER:g} times as wide as what is seen: {first_of(larger, MOST_NAMES)}",
-        )
+    models = [model for model in world.models if model.name in among and model.name not in unread]
+    kinds = {model.name: _unlike(model) for model in models}
+    for about, words in UNLIKE.items():
+        names = [name for name, kind in kinds.items() if kind == about]
+        if names:
+            yield about, f"{words}: {first_of(names, MOST_NAMES)}"
+
+
+def _unlike(model: Model) -> str:
+    """In which way, of those in UNLIKE, what can be hit of a model is unlike what is seen of it; "" if it is not."""
+    hit = model_bounds(model)
+    visuals = (visual for link in model.links for visual in link.visuals)
+    seen = around(shape_bounds(visual.shape, visual.pose) for visual in visuals)
+    if seen is None:
+        return "" if hit is None else "unseen"
+    size = seen[1] - seen[0]
+    if hit is None:
+        # Nobody minds driving over what is flat, such as the lines on a floor.
+        return "passable" if size[2] > THIN else ""
+    is_larger = ((hit[1] - hit[0])[:2] > LARGER * np.maximum(size, THIN)[:2]).any()
+    return "larger" if is_larger else ""
 
 
 def inside(world: World) -> list[Inside]:

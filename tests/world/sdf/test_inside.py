@@ -98,7 +98,7 @@ def test_what_moves_and_what_others_are_placed_relative_to_stays_whole_and_is_no
     assert world.elements()[:2] == ("cart", "lamp")
     whole = {note.model: note.why for note in world.notes if note.what == "--inside"}
     assert "it can move" in whole["cart"]
-    assert "relative to it" in whole["base"]
+    assert "other models depend on it" in whole["base"]
 
 
 @pytest.fixture

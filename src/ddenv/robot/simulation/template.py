@@ -27,7 +27,7 @@ from ddenv.robot.simulation.run import Run
 from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, solids
 from ddenv.world.drive import find_drive
 from ddenv.world.extent import with_ground_boxes
-from ddenv.world.model import Model, World, is_ground
+from ddenv.world.model import Model, World
 from ddenv.world.placement import spawn_pose
 from ddenv.world.pose import Point
 from ddenv.world.scenario import Scenario
@@ -55,9 +55,7 @@ class Template:
         self._drive = find_drive(robot, scenario.robot.wheels)
         self._controllers = controllers(scenario.controller, scenario.folder)
         names = frozenset(world.names)
-        grounds = frozenset(model.name for model in world.models if is_ground(model))
-        fixed = set(scenario.protected)
-        self._always = grounds | {model.name for model in world.models if fixed & {model.name, model.inside}}
+        self._always = names - frozenset(world.elements(scenario.protected))
         self._clock = Clock.of(scenario)
         self._setup = setup_of(robot, self._drive, self._clock, scenario)
         self._obstacles = Obstacles.of(world) if scenario.sensors.lidar else None

@@ -204,6 +204,7 @@ class Preview(Vertical):
     def _fetch(self, choice: Choice) -> None:
         """Downloads from Fuel what a world lacks; the user may look at others meanwhile."""
         from ddenv.runs.fetching import fetch_missing
+        from ddenv.world.sdf.read import parse_world
 
         needs = choice.settings
 
@@ -219,7 +220,14 @@ class Preview(Vertical):
             call_if_open(self, partial(self.notify, timeout=10, markup=False), plain(words))
 
         try:
-            fetch_missing(needs.world, needs.reading, lambda model: partial(arrived, model.name), tell)
+            fetch_missing(
+                needs.world,
+                needs.reading,
+                parse_world,
+                show=lambda model: partial(arrived, model.name),
+                tell=tell,
+                advice="w leaves it out",
+            )
         except UserError as error:
             tell(str(error))
         self._fetching = None

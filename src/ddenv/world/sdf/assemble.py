@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ddenv.world.model import Joint, Link, Model, is_ground, still_links
 from ddenv.world.pose import ONE, Pose, Vector, vector
 from ddenv.world.sdf.casters import without_ball_joints
-from ddenv.world.sdf.context import Context, note_unread
+from ddenv.world.sdf.context import MOST_MODELS, Context, note_unread
 from ddenv.world.sdf.frames import WORLD, Scope, pose_of
 from ddenv.world.sdf.includes import Part
 from ddenv.world.sdf.joints import LinkPose, Spot, check_tree, read_joints
@@ -19,8 +19,6 @@ from ddenv.world.sdf.xml import Element, complain, floats, name_of, numbers, tex
 STILL = 0.01
 # Smallest difference between `<state>` and a model's own pose that counts as a move, m and sine of half the angle.
 MOVED = 0.001
-# Maximum number of models: a few files that include each other could ask for more than any machine can hold.
-MOST_MODELS = 50_000
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,14 @@ from ddenv.world.sdf.standin import ALL_MISSING, AUTO, StandIn, matching, parse_
 from ddenv.world.sdf.xml import Element, complain, floats, parse, place
 from ddenv.world.tinyxml import strict_fault
 
+# Maximum number of models: a few files that include each other could ask for more than any machine can hold.
+MOST_MODELS = 50_000
 VERSIONS = ("1.4", "1.5", "1.6", "1.7", "1.8", "1.9", "1.10", "1.11", "1.12")
 # By parent: the children that need no note, since they are read or do not affect how a robot drives.
 QUIET: dict[str, frozenset[str]] = {
     tag: frozenset(children.split())
     for tag, children in {
-        "world": "model include state frame gravity light gui scene physics spherical_coordinates magnetic_field "
+        "world": "model include population state frame gravity light gui scene physics spherical_coordinates magnetic_field "
         "atmosphere audio",
         "model": "link joint model include frame pose static self_collide allow_auto_disable",
         "include": "uri name pose placement_frame static",
@@ -49,7 +51,7 @@ ONCE |= {"axis", "axis2", "parent", "child", "limit"}
 REASONS = {
     "plugin": "plugins are not run",
     "sensor": "only the robot's own sensors are simulated",
-    "actor": "nothing can touch it",
+    "actor": "actors are not simulated",
     "road": "it is not drawn",
     "wind": "wind is not simulated",
     "enable_wind": "wind is not simulated",

@@ -39,7 +39,7 @@ def opened(world: World, root: Element) -> World:
         if not model.static:
             closed = "it can move"
         elif model.name in world.anchors:
-            closed = "other models are placed relative to it"
+            closed = "other models depend on it"
         elif element.tag == "include" or element.find(".//include") is not None:
             closed = "parts of it are in files that cannot be copied into this one; 'ddenv world convert' does it"
         links = {} if closed else dict(_links(element))

@@ -24,7 +24,7 @@ def with_places(world: World, places: Mapping[str, Sequence[Pose]], reading: Rea
     """The text of `world` with the links of some models at `places`, and the names of those that could not be moved.
 
     `places` are the poses of all links of a model in the world frame; `reading` is how the world was read. A model whose links
-    moved against each other can only be moved if `<state>` holds its links; one that others are placed relative to stays.
+    moved against each other can only be moved if `<state>` holds its links; one that others depend on stays.
     """
     asked = {name: there for name, there in places.items() if name not in world.anchors}
     wanted = {model.name: [link.pose for link in model.links] for model in world.models}
