@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from manifold3d import Manifold
 
 from ddenv.world.files.boxes import box_of, volume
-from ddenv.world.files.pieces import MOST_PLATES, PLATE, convex_pieces
+from ddenv.world.files.pieces import MOST_PLATES, PLATE, build_pieces, convex_pieces
+from ddenv.world.files.triangles import Part
 from ddenv.world.model import Mesh
 from tests.tiers import examples
 
@@ -167,3 +168,25 @@ def test_any_triangles_at_all_become_pieces_within_their_hull(vertices, faces):
     slack = max(PLATE, 1e-3 * float(np.max(high - low)))
     for piece in pieces:
         assert (piece.vertices >= low - slack).all() and (piece.vertices <= high + slack).all()
+
+
+def test_pieces_are_cut_once_and_what_is_damaged_is_cut_again(tmp_path, monkeypatch):
+    monkeypatch.setenv("DDENV_HOME", str(tmp_path))
+    cuts = []
+    monkeypatch.setattr(
+        "ddenv.world.files.pieces.convex_pieces", lambda *given: cuts.append(1) or convex_pieces(*given)
+    )
+    parts = [Part("", *surface(house(4.0, 3.0, 0.9)))]
+
+    def build(most=64, scale=(1.0, 1.0, 1.0)):
+        return build_pieces(parts, "", False, scale, most)
+
+    first = build()
+    assert build() == first and len(cuts) == 1
+    assert build(scale=(2.0, 1.0, 1.0)) != first and len(cuts) == 2
+    assert build(most=1) != first and len(cuts) == 3
+    for file in (tmp_path / "cache" / "pieces").iterdir():
+        file.write_bytes(file.read_bytes()[:-1])
+    assert build() == first and len(cuts) == 4
+    monkeypatch.setenv("DDENV_HOME", "/proc/nowhere")
+    assert build() == first and len(cuts) == 5

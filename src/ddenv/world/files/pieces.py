@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.world.access import Unusable
+from ddenv.world.files.kept_pieces import keep, kept_file, read_kept
 from ddenv.world.files.meshes import Surface, convex_hull, pack_pieces, surface_of
 from ddenv.world.files.triangles import Part
 from ddenv.world.pose import Vector
@@ -50,11 +51,17 @@ SIMPLER = 0.005
 def build_pieces(parts: list[Part], submesh: str, center: bool, scale: Vector, most: int) -> bytes:
     """The convex pieces, at most `most`, of what `build` takes from these arguments, times `scale`; packed. Raises Unusable."""
     vertices, faces = surface_of(parts, submesh, center)
+    vertices = vertices * np.array(scale)
+    kept = kept_file(vertices, faces, most)
+    packed = read_kept(kept)
+    if packed is not None:
+        return packed
     try:
-        pieces = convex_pieces(vertices * np.array(scale), faces.astype(np.int64), most)
+        packed = pack_pieces(convex_pieces(vertices, faces.astype(np.int64), most))
     except ValueError as error:
         raise Unusable(str(error)) from None
-    return pack_pieces(pieces)
+    keep(kept, packed)
+    return packed
 
 
 def convex_pieces(vertices: Floats, faces: Integers, most: int) -> list[Surface]:
