@@ -8,9 +8,8 @@ import pytest
 import trimesh
 
 from ddenv.errors import UserError
-from ddenv.world.extent import around, shape_bounds
+from ddenv.world.extent import around, shape_bounds, vertices_of
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere
-from ddenv.world.pose import Pose
 from ddenv.world.sdf.geometry import DEFAULT_SIZES
 
 
@@ -65,15 +64,25 @@ def test_planes_are_turned_as_their_normal_says(read, normal):
     assert plane.pose.rotate((0, 0, 1)) == pytest.approx(wanted / np.linalg.norm(wanted))
 
 
-def test_a_polyline_stands_on_its_frame_as_its_hull(read):
-    points = "".join(f"<point>{x} {y}</point>" for x, y in ((0, 0), (2, 0), (2, 1), (1, 0.2), (0, 1)))
-    world = read(model(f"<polyline><height>3</height>{points}</polyline>"))
-    shape = shape_of(world)
-    low, high = shape_bounds(shape, Pose())
-    assert (low.tolist(), high.tolist()) == ([0, 0, 0], [2, 1, 3])
-    solid = trimesh.Trimesh(shape.vertices, shape.faces)
-    assert solid.is_watertight and solid.volume == pytest.approx(6)
-    assert "not convex" in world.notes[0].why
+def outline(*corners):
+    return f"<polyline><height>3</height>{''.join(f'<point>{x} {y}</point>' for x, y in corners)}</polyline>"
+
+
+@pytest.mark.parametrize(
+    ("outlines", "volume"),
+    [
+        (outline((0, 0), (2, 0), (2, 1), (0, 1)), 6),
+        (outline((0, 0), (2, 0), (2, 1), (1, 0.2), (0, 1)), 3.6),
+        # A frame: the inner outline is a hole.
+        (outline((0, 0), (2, 0), (2, 1), (0, 1)) + outline((0.5, 0.2), (1.5, 0.2), (1.5, 0.8), (0.5, 0.8)), 4.2),
+    ],
+)
+def test_polylines_stand_on_their_frame_with_their_notches_and_holes(read, outlines, volume):
+    solids = read(model(outlines)).models[0].collisions
+    low, high = around(shape_bounds(one.shape, one.pose) for one in solids)
+    assert [*low, *high] == pytest.approx([0, 0, 0, 2, 1, 3], abs=1e-5)
+    filled = sum(trimesh.convex.convex_hull(vertices_of(one.shape, 0)[0]).volume for one in solids)
+    assert filled == pytest.approx(volume, rel=1e-5)
 
 
 @pytest.fixture

@@ -157,6 +157,11 @@ def _plates(part: trimesh.Trimesh) -> Iterator[Manifold]:
         yield plate.transform(np.linalg.inv(to_plane)[:3])
 
 
+def extruded(outlines: Iterable[Floats], height: float) -> Surface:
+    """The surface of what outlines (N, 2) m enclose, from z = 0 up to `height` m; what lies in two of them is a hole."""
+    return _triangles(CrossSection(list(outlines), FillRule.EvenOdd).extrude(height))
+
+
 def union(outlines: Iterable[CrossSection]) -> CrossSection:
     """All that any of `outlines` covers."""
     return CrossSection.batch_boolean(list(outlines), OpType.Add)
@@ -221,9 +226,7 @@ def _planes(solid: Manifold) -> list[tuple[Floats, float]]:
 
     Each has its unit normal, and its distance from the origin along that, m.
     """
-    mesh = solid.to_mesh64()
-    vertices = np.asarray(mesh.vert_properties)[:, :3]
-    faces = np.asarray(mesh.tri_verts).astype(np.int64)
+    vertices, faces = _triangles(solid)
     normals = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
     areas = np.linalg.norm(normals, axis=1)
     normals /= np.maximum(areas, 1e-30)[:, None]
@@ -259,7 +262,12 @@ def _rounded(hull: Manifold) -> Manifold:
 
 
 def _surface(hull: Manifold) -> Surface:
-    return convex_hull(np.asarray(hull.to_mesh64().vert_properties)[:, :3])
+    return convex_hull(_triangles(hull)[0])
+
+
+def _triangles(solid: Manifold) -> Surface:
+    mesh = solid.to_mesh64()
+    return np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
 
 
 def _patches(parts: Iterable[Floats], most: int) -> list[Floats]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -82,7 +82,7 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
         case "mesh":
             return _mesh(element, parent, context, scale)
         case "polyline":
-            return Placed(_scaled(read_polyline(geometry, context), scale, element))
+            return _polyline(geometry, scale)
         case "empty":
             return None
         case "heightmap" | "image" as tag:
@@ -158,18 +158,17 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
 
 def _solid(part: MeshPart, element: Element, parent: Element, context: Context, scale: Vector) -> Placed:
     """What collides in place of a mesh: its convex pieces, or its hull. Raises Missing, Unusable and UserError."""
-    mesh = context.resources.mesh(part, convex=True)
-    hull = _scaled(mesh, scale, element)
+    hull = _scaled_mesh(context.resources.mesh(part, convex=True), scale, element)
     most = _most_pieces(element, parent, context)
     pieces = context.resources.pieces(part, scale, most) if most > 1 else []
-    if len(pieces) == 1 and isinstance(hull, Mesh) and (box := box_of(hull)) is not None:
+    if len(pieces) == 1 and (box := box_of(hull)) is not None:
         return Placed(*box)
     if len(pieces) < 2:
         context.note("replaced", element, f"'{part.uri}' by its convex hull; {ROUGH}")
         return Placed(hull)
     context.note("replaced", element, f"'{part.uri}' by its convex pieces; {ROUGH}", f"{len(pieces)} pieces")
-    whole = _scaled(context.resources.mesh(part, convex=False), scale, element)
-    return Placed(whole, pieces=tuple(box_of(piece) or (piece, HERE) for piece in pieces))
+    whole = _scaled_mesh(context.resources.mesh(part, convex=False), scale, element)
+    return _of_pieces(whole, pieces)
 
 
 def _most_pieces(element: Element, parent: Element, context: Context) -> int:
@@ -215,6 +214,8 @@ def remedies(lost: Lost, siblings: Names) -> str:
 def _scaled(shape: Shape, scale: Vector, element: Element) -> Shape:
     """`shape`, with its sizes along its own axes times `scale`. Raises UserError if it is too small or too large then."""
     match shape:
+        case Mesh():
+            return _scaled_mesh(shape, scale, element)
         case _ if scale == ONE:
             pass
         case Box(size):
@@ -225,18 +226,25 @@ def _scaled(shape: Shape, scale: Vector, element: Element) -> Shape:
             shape = Sphere(radius * max(scale))
         case Ellipsoid(radii):
             shape = Ellipsoid(_times(radii, scale))
-        case Mesh(origin, vertices, faces):
-            # Mirroring turns a surface inside out: reverse its faces.
-            turned = faces[:, ::-1] if np.prod(scale) < 0 else faces
-            shape = Mesh(f"{origin} * {scale}", vertices * np.array(scale), turned)
-    if isinstance(shape, Mesh):
-        sizes = [np.ptp(shape.vertices, axis=0).max(), max(np.abs(shape.vertices).max(), SMALLEST)]
-    else:
-        sizes = [size for each in primitive(shape)[1].values() for size in each]
+    _check_sizes([size for each in primitive(shape)[1].values() for size in each], element)
+    return shape
+
+
+def _scaled_mesh(mesh: Mesh, scale: Vector, element: Element) -> Mesh:
+    if scale != ONE:
+        # Mirroring turns a surface inside out: reverse its faces.
+        faces = mesh.faces[:, ::-1] if np.prod(scale) < 0 else mesh.faces
+        vertices = mesh.vertices * np.array(scale)
+        mesh = Mesh(f"{mesh.origin} * {scale}", vertices, faces, simplified=mesh.simplified)
+    largest = float(np.ptp(mesh.vertices, axis=0).max())
+    _check_sizes([largest, max(float(np.abs(mesh.vertices).max()), SMALLEST)], element)
+    return mesh
+
+
+def _check_sizes(sizes: Sequence[float], element: Element) -> None:
     if min(sizes) < SMALLEST or max(sizes) > LARGEST:
         wrong = min(sizes) if min(sizes) < SMALLEST else max(sizes)
         raise complain(element, f"{RANGE}, found {wrong:g} m after scaling")
-    return shape
 
 
 def _times(vector: Vector, scale: Vector) -> Vector:
@@ -257,24 +265,38 @@ def _sizes(shape: Element, tag: str) -> tuple[float, ...]:
     return values
 
 
-def read_polyline(geometry: Element, context: Context) -> Mesh:
-    """The convex hull of all `<polyline>`s of a `<geometry>`, extruded upwards from z = 0. Raises UserError."""
+def _polyline(geometry: Element, scale: Vector) -> Placed:
+    """All `<polyline>`s of a `<geometry>`, extruded upwards from z = 0; what lies in two of them is a hole. Raises UserError."""
     elements = geometry.findall("polyline")
     height = _sizes(elements[0], "height")[0]
     outlines = [np.array([numbers(point, 2) for point in element.findall("point")]) for element in elements]
     corners = convex_hull(np.vstack([outline.reshape(-1, 2) for outline in outlines]))
     if len(corners) < 3:
         raise complain(elements[0], "needs at least three <point>s that are not on one line")
-    filled = abs(polygon_area(outlines[0]))
-    if len(elements) > 1 or filled < 0.99 * polygon_area(corners):
-        context.note("replaced", elements[0], "a polyline that is not convex, or has holes, by its convex hull")
-    low = np.column_stack([corners, np.zeros(len(corners))])
     # Meshes of equal outlines compare equal.
-    origin = f"polyline {hashlib.blake2b(corners.tobytes(), digest_size=8).hexdigest()} {height!r}"
+    digest = hashlib.blake2b(repr([outline.tolist() for outline in outlines]).encode(), digest_size=8).hexdigest()
+    origin = f"polyline {digest} {height!r}"
+    if len(elements) == 1 and abs(polygon_area(outlines[0])) >= 0.99 * polygon_area(corners):
+        low = np.column_stack([corners, np.zeros(len(corners))])
+        try:
+            convex = Mesh(origin, *hull(np.vstack([low, low + np.array([0, 0, height])])))
+        except ValueError as error:
+            raise complain(elements[0], str(error)) from None
+        return Placed(_scaled(convex, scale, elements[0]))
+    # Loaded late: most worlds have no such shape.
+    from ddenv.world.files.pieces import convex_pieces, extruded
+
+    whole = _scaled_mesh(Mesh(origin, *extruded(outlines, height)), scale, elements[0])
     try:
-        return Mesh(origin, *hull(np.vstack([low, low + np.array([0, 0, height])])))
+        pieces = convex_pieces(whole.vertices, whole.faces, MOST_PIECES)
     except ValueError as error:
         raise complain(elements[0], str(error)) from None
+    return _of_pieces(whole, [Mesh(f"{origin} {number}", *piece) for number, piece in enumerate(pieces)])
+
+
+def _of_pieces(whole: Shape, pieces: list[Mesh]) -> Placed:
+    """A mesh that collides as its convex pieces, of which those that are boxes become boxes."""
+    return Placed(whole, pieces=tuple(box_of(piece) or (piece, HERE) for piece in pieces))
 
 
 def cone(radius: float, length: float) -> Mesh:
