@@ -16,12 +16,14 @@ from ddenv.world.model import (
     Collision,
     Cylinder,
     Ellipsoid,
+    Ground,
     Link,
     Mesh,
     Model,
     Plane,
     Shape,
     Sphere,
+    Terrain,
     World,
 )
 from ddenv.world.pose import HERE, Point, Pose, Vector, vector
@@ -49,6 +51,10 @@ def shape_bounds(shape: Shape, pose: Pose) -> Bounds:
             half = np.full(3, radius)
         case Plane():
             half = np.zeros(3)
+        case Terrain((length, width), heights):
+            lowest, highest = float(np.nanmin(heights)), float(np.nanmax(heights))
+            place = pose @ Pose((0.0, 0.0, (lowest + highest) / 2))
+            return shape_bounds(Box((length, width, highest - lowest)), place)
     return center - half, center + half
 
 
@@ -58,7 +64,7 @@ _CUBE = np.array(list(product((-0.5, 0.5), repeat=3)))
 
 
 def vertices_of(shape: Shape, sides: int = SIDES) -> tuple[np.ndarray, float]:
-    """The vertices (N, 3) m of a shape other than a plane in its own frame, and how much it is larger than their hull, m."""
+    """The vertices (N, 3) m of a shape other than ground in its own frame, and how much it is larger than their hull, m."""
     ends = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
     match shape:
         case Box(size):
@@ -87,9 +93,13 @@ def circle(sides: int) -> np.ndarray:
 
 
 def filled_bounds(collision: Collision) -> Bounds:
-    """The box around what a shape fills: all that is below a plane, everything if that leans."""
-    if not isinstance(collision.shape, Plane):
-        return shape_bounds(collision.shape, collision.pose)
+    """The box around what a shape fills: all that is below a plane or terrain, everything if a plane leans."""
+    low, high = shape_bounds(collision.shape, collision.pose)
+    if not isinstance(collision.shape, Ground):
+        return low, high
+    if isinstance(collision.shape, Terrain):
+        low[2] = -np.inf
+        return low, high
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     if collision.pose.rotation()[2, 2] > 1 - 1e-9:
         high[2] = collision.pose.position[2]

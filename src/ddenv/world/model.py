@@ -72,7 +72,22 @@ class Mesh:
     simplified: bool = field(default=False, compare=False)
 
 
-Shape = Box | Cylinder | Sphere | Plane | Capsule | Ellipsoid | Mesh
+@dataclass(frozen=True, slots=True)
+class Terrain:
+    """Solid ground below `heights` (R, C) m, which lie on a grid of `size` (x, y) m around its frame's origin.
+
+    Rows follow y, columns x. Between four heights the surface is bilinear; where a height is not a number there is no ground.
+    Terrains are equal if they have the same `origin`, as meshes are.
+    """
+
+    size: tuple[float, float]
+    heights: np.ndarray = field(compare=False, repr=False)
+    origin: str
+
+
+# What has no closed surface, but is solid below.
+Ground = Plane | Terrain
+Shape = Box | Cylinder | Sphere | Capsule | Ellipsoid | Mesh | Ground
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,11 +313,11 @@ ENDLESS = 200.0
 
 
 def is_ground(model: Model) -> bool:
-    """Whether the model holds an infinite plane, or a box that stands for one (as `ddenv.world.write` writes it).
+    """Whether the model holds terrain, an infinite plane, or a box that stands for one (as `ddenv.world.write` writes it).
 
     The ground carries everything else: it is never an element.
     """
-    if any(isinstance(collision.shape, Plane) for collision in model.collisions):
+    if any(isinstance(collision.shape, Ground) for collision in model.collisions):
         return True
     shown = any(isinstance(visual.shape, Plane) for link in model.links for visual in link.visuals)
     boxes = (one.shape.size for one in model.collisions if isinstance(one.shape, Box)) if shown else ()

@@ -13,9 +13,10 @@ from ddenv.errors import UserError
 from ddenv.text import count, first_of
 from ddenv.world.drive import turning_links
 from ddenv.world.extent import Bounds, around, bounds, filled_bounds, model_bounds, shape_bounds, stacked, vertices_of
-from ddenv.world.model import Collision, Mesh, Model, Plane, Shape, World, is_ground
+from ddenv.world.model import Collision, Ground, Mesh, Model, Plane, Shape, Terrain, World, is_ground
 from ddenv.world.pose import Point, Pose
 from ddenv.world.scenario import Spawn
+from ddenv.world.terrain import clearance
 
 # Tolerated overlap, m: contacts at rest overlap slightly, and numbers in files are rounded.
 TOLERANCE = 0.02
@@ -97,7 +98,7 @@ def _obstacle(
     own = bounds(robot.collisions, place)
     if own is None:
         raise UserError(f"robot.model: '{robot.name}' has no collision shapes")
-    bodies = [hull(one, place) for one in robot.collisions if not isinstance(one.shape, Plane)]
+    bodies = [hull(one, place) for one in robot.collisions if not isinstance(one.shape, Ground)]
     found: tuple[Model, float, Shape] | None = None
     near = ((own[0] <= boxes[1]) & (boxes[0] <= own[1])).all(axis=1)
     for model, one in (shapes[number] for number in np.flatnonzero(near).tolist()):
@@ -111,6 +112,8 @@ def _obstacle(
 
 def _depth(body: Hull, obstacle: Collision) -> float:
     """How deep a body is inside an obstacle, m."""
+    if isinstance(obstacle.shape, Terrain):
+        return body.radius - clearance(obstacle.shape, obstacle.pose, body.vertices)
     if not isinstance(obstacle.shape, Plane):
         return overlap(body, hull(obstacle))
     up = np.array(obstacle.pose.rotate((0.0, 0.0, 1.0)))
@@ -149,9 +152,9 @@ def notes_on_start(world: World, robot: Model, spawn: Spawn, goal: Point | None 
             "wheels",
             f"no wheel touches anything: the robot stands on its body, its wheels {hanging:.2f} m above the ground",
         )
-    # Planes and meshes may be ground.
+    # Meshes may be ground, too.
     solid = (
-        (model, one) for model in world.models for one in model.collisions if not isinstance(one.shape, (Plane, Mesh))
+        (model, one) for model in world.models for one in model.collisions if not isinstance(one.shape, Ground | Mesh)
     )
     place = Hull(np.array([[*(goal or ()), spawn.z]]))
     blocker = next((model.name for model, one in solid if goal and _depth(place, one) > TOLERANCE), None)
@@ -231,7 +234,7 @@ def inside(world: World) -> list[Inside]:
     for first, second in islice(_near(shapes), MOST_PAIRS):
         (model, shape), (other, obstacle) = shapes[first], shapes[second]
         # What cannot move, or has no end, is the obstacle.
-        if model.static or isinstance(shape.shape, Plane):
+        if model.static or isinstance(shape.shape, Ground):
             (model, shape), (other, obstacle) = (other, obstacle), (model, shape)
         depth = _depth(hull(shape), obstacle)
         if depth > INSIDE:
@@ -259,7 +262,7 @@ def _near(shapes: Sequence[tuple[Model, Collision]]) -> Iterator[tuple[int, int]
 
 def overlap_of(model: Model, other: Model) -> float:
     """How deep a model is inside another one, m; 0 if they do not overlap. Planes are no bodies."""
-    bodies = [hull(one) for one in model.collisions if not isinstance(one.shape, Plane)]
+    bodies = [hull(one) for one in model.collisions if not isinstance(one.shape, Ground)]
     return max((_depth(body, one) for body in bodies for one in other.collisions), default=0.0)
 
 
@@ -269,9 +272,13 @@ def drop(world: World, robot: Model, spawn: Spawn) -> float:
     Everything is taken as large as the box around it.
     """
     place = spawn_pose(spawn) @ robot.pose.inverse()
-    boxes = [shape_bounds(one.shape, place @ one.pose) for one in robot.collisions if not isinstance(one.shape, Plane)]
+    bodies = [hull(one, place) for one in robot.collisions if not isinstance(one.shape, Ground)]
+    boxes = [shape_bounds(one.shape, place @ one.pose) for one in robot.collisions if not isinstance(one.shape, Ground)]
     heights = []
     for collision in (one for model in world.models for one in model.collisions):
+        if isinstance(collision.shape, Terrain):
+            heights += [-depth for body in bodies if (depth := _depth(body, collision)) > -math.inf]
+            continue
         low, high = shape_bounds(collision.shape, collision.pose)
         endless = isinstance(collision.shape, Plane)
         below = (bottom for bottom, top in boxes if endless or ((bottom < high)[:2].all() and (low < top)[:2].all()))
@@ -289,7 +296,7 @@ class Hull:
 
 
 def hull(collision: Collision, place: Pose | None = None) -> Hull:
-    """The convex body of a collision shape other than a plane, moved by `place`."""
+    """The convex body of a collision shape other than ground, moved by `place`."""
     pose = collision.pose if place is None else place @ collision.pose
     vertices, radius = vertices_of(collision.shape)
     return Hull(vertices @ pose.rotation().T + pose.position, radius)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -73,11 +74,18 @@ class Choice:
 
     def _ground(self, x: float, y: float) -> float | None:
         """The highest top of the boxes around the shapes at (x, y), m. None where there is nothing."""
+        import numpy as np
+
         from ddenv.world.extent import shape_bounds
-        from ddenv.world.model import Plane
+        from ddenv.world.model import Plane, Terrain
+        from ddenv.world.terrain import clearance
 
         tops = []
         for collision in (each for model in self.world.models for each in model.collisions):
+            if isinstance(collision.shape, Terrain):
+                top = -clearance(collision.shape, collision.pose, np.array([[x, y, 0.0]]))
+                tops += [top] if math.isfinite(top) else []
+                continue
             if isinstance(collision.shape, Plane):
                 tops.append(float(collision.pose.position[2]))
                 continue

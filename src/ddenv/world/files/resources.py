@@ -16,9 +16,11 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
+from ddenv.arrays import Floats
 from ddenv.text import first_of
 from ddenv.world.access import Missing, Unusable, folders_of, is_file, is_folder, read, reason, xml_root
 from ddenv.world.files.fuel import GAZEBO, FuelModel, cached, caches, hosts, in_fuel, newest, refuse_link_out
+from ddenv.world.files.heights import read_heights, unpack_heights
 from ddenv.world.files.meshes import build, read_parts, unpack, unpack_pieces
 from ddenv.world.files.roots import absolute, source_of
 from ddenv.world.files.triangles import Part
@@ -62,6 +64,7 @@ class Resources:
         self._files: dict[str, tuple[Path, bytes]] = {}
         self._meshes: dict[str, Mesh] = {}
         self._pieces: dict[str, list[Mesh]] = {}
+        self._heights: dict[str, Floats] = {}
         self._failed: dict[str, Missing | Unusable] = {}
         # Collisions and visuals use the same files, and different parts of them; the longest known first.
         self._parts_of: dict[Path, list[Part]] = {}
@@ -100,6 +103,18 @@ class Resources:
             self._pieces[key] = unpack_pieces(key, packed)
         return self._pieces[key]
 
+    def heights(self, part: MeshPart) -> Floats:
+        """The heights (R, C) in an image, as a share of the greatest; the first row has the least y."""
+        self.asked[part.uri, part.base] = None
+        key = part.key("heightmap")
+        if key not in self._heights:
+
+            def ask(folders: Mapping[Path, str]) -> bytes:
+                return read_heights(self._find(part.uri, part.base, folders, model=False))
+
+            self._heights[key] = unpack_heights(self._bytes(key, ask))
+        return self._heights[key]
+
     def config_fault(self, folder: Path) -> str:
         """Why the model.config in the folder of a model cannot be read, so that its model.sdf is taken; empty if it can."""
         key = json.dumps(["config", str(folder)])
@@ -108,10 +123,10 @@ class Resources:
         return self.taken.get(key, b"").decode("utf-8", "replace")
 
     def rename(self, uri: str, folder: str, new: str, new_folder: str) -> None:
-        """Makes the meshes called `uri` in files of `folder` also known as `new` in files of `new_folder`."""
+        """Makes the meshes and images called `uri` in files of `folder` also known as `new` in files of `new_folder`."""
         for key, content in list(self.taken.items()):
             kind, *names = json.loads(key)
-            if kind in ("mesh", "pieces") and names[:2] == [uri, folder]:
+            if kind in ("mesh", "pieces", "heightmap") and names[:2] == [uri, folder]:
                 self.taken[json.dumps([kind, new, new_folder, *names[2:]])] = content
 
     def _bytes(self, key: str, ask: Callable[[Mapping[Path, str]], bytes]) -> bytes:

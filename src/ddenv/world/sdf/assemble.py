@@ -71,7 +71,7 @@ def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context
         context.note("replaced", part.element, "self-collision of some links by self-collision of all links")
     if not is_ground(model):
         return without_ball_joints(model, part.element, context)
-    context.note("replaced", part.element, "static, since an infinite plane does not move")
+    context.note("replaced", part.element, "static, since ground does not move")
     return _still(model)
 
 

@@ -14,7 +14,7 @@ from ddenv.world.extent import circle, convex_hull, polygon_area
 from ddenv.world.files.boxes import box_of
 from ddenv.world.files.meshes import convex_hull as hull
 from ddenv.world.files.resources import MeshPart
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere, Terrain
 from ddenv.world.pose import HERE, ONE, Pose, Vector, pointing, vector
 from ddenv.world.sdf.context import Context, refuse
 from ddenv.world.sdf.standin import AUTO, NONE, SIZES, Placed
@@ -22,7 +22,7 @@ from ddenv.world.sdf.xml import Element, complain, number, numbers, text_of, tru
 from ddenv.world.write import primitive
 
 SIDES = 32  # of a cone
-SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline")
+SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline", "heightmap")
 SMALLEST, LARGEST = 1e-6, 1e6  # m
 # The sizes of a shape whose element gives none, m: those of libsdformat, by the element and its child.
 DEFAULT_SIZES: dict[tuple[str, str], tuple[float, ...]] = {
@@ -34,6 +34,7 @@ DEFAULT_SIZES: dict[tuple[str, str], tuple[float, ...]] = {
     ("cylinder", "radius"): (1.0,),
     ("cylinder", "length"): (1.0,),
     ("ellipsoid", "radii"): (1.0, 1.0, 1.0),
+    ("heightmap", "size"): (1.0, 1.0, 1.0),
     ("plane", "size"): (1.0, 1.0),
     ("polyline", "height"): (1.0,),
     ("sphere", "radius"): (1.0,),
@@ -88,7 +89,7 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
         case "heightmap" | "image" as tag:
             seen = parent.tag == "visual"
             if not seen and not context.ignores(tag):
-                raise refuse(element, tag, f"a {tag} is not supported: nothing would collide with it")
+                return _terrain(element, context, scale)
             why = f"a {tag} is not drawn" if seen else "left out by --ignore: nothing collides with it"
             context.note("ignored", element, why)
             return None
@@ -154,6 +155,25 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
     if mesh.simplified:
         context.note("replaced", element, f"'{uri}' by its convex hull, since it is too fine to be drawn")
     return Placed(_scaled(mesh, full, element))
+
+
+def _terrain(element: Element, context: Context, scale: Vector) -> Placed:
+    """The ground that a `<heightmap>` stands for. Raises UserError."""
+    if element.tag == "image":
+        raise refuse(element, "image", "an image is not supported: nothing would collide with it")
+    uri = text_of(element.find("uri"))
+    if not uri:
+        raise complain(element, "has no <uri>")
+    size = _times(vector(_sizes(element, "size")), scale)
+    place = element.find("pos")
+    try:
+        shares = context.resources.heights(MeshPart(uri, element.source.parent))
+    except (Missing, Unusable) as error:
+        what = "is not available" if isinstance(error, Missing) else "is unreadable"
+        raise refuse(element, "heightmap", f"heightmap '{uri[:200]}' {what}: {error}") from None
+    digest = hashlib.blake2b(shares.tobytes(), digest_size=8).hexdigest()
+    terrain = Terrain(size[:2], shares * size[2], f"{uri} {digest} {size}")
+    return Placed(terrain, HERE if place is None else Pose(_times(vector(numbers(place, 3)), scale)))
 
 
 def _solid(part: MeshPart, element: Element, parent: Element, context: Context, scale: Vector) -> Placed:

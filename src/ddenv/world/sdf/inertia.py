@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Inertia, Mesh, Plane, Shape, Sphere
+from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Ground, Inertia, Mesh, Shape, Sphere
 from ddenv.world.pose import Pose, Vector, vector
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import pose_of
@@ -30,7 +30,7 @@ def read_inertia(
 ) -> Inertia:
     """The inertia of a moving link at `link_pose`, in the world frame; `density` (kg/m^3) has one entry per collision."""
     inertia = _given(link, link_pose, collisions, density, context)
-    if all(isinstance(one.shape, Plane) for one in collisions):
+    if all(isinstance(one.shape, Ground) for one in collisions):
         return inertia
     least = spread(collisions, density, link_pose, LIGHTEST_IN_CONTACT)
     solid_enough = f"contacts need at least those of {LIGHTEST_IN_CONTACT:g} kg, spread evenly over its shapes"
@@ -114,7 +114,7 @@ def _principal(moments: Vector, products: Vector) -> Vector:
 
 def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose: Pose, mass: float | None) -> Inertia:
     """The inertia of solid shapes (overlaps count twice), scaled to `mass` (kg) unless that is None."""
-    pairs = [(one, each) for one, each in zip(collisions, density, strict=True) if not isinstance(one.shape, Plane)]
+    pairs = [(one, each) for one, each in zip(collisions, density, strict=True) if not isinstance(one.shape, Ground)]
     if not pairs:
         return _ball(link_pose, DEFAULT_MASS if mass is None else mass)
     solids = [(*solid(one.shape), one.pose, each) for one, each in pairs]
