@@ -311,12 +311,16 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
         ],
     },
     "a collision `<heightmap>`": {
-        "/geometry/heightmap: a heightmap is not supported.*--ignore heightmap": [
+        "/geometry/heightmap: heightmap 'h.png' is not available: .*--ignore heightmap": [
             shape("<heightmap><uri>h.png</uri></heightmap>")
-        ]
+        ],
+        "/heightmap: has no <uri>": [shape("<heightmap/>")],
+        r"/heightmap/size: sizes must be from 1e-06 to 1e\+06 m, found '9 0 1'": [
+            shape("<heightmap><uri>h.png</uri><size>9 0 1</size></heightmap>")
+        ],
     },
     "a collision `<image>`": {
-        "/geometry/image: a image is not supported.*--ignore image": [shape("<image><uri>x.png</uri></image>")]
+        "/geometry/image: an image is not supported.*--ignore image": [shape("<image><uri>x.png</uri></image>")]
     },
     "friction or damping": {
         "/mu: friction must not be negative, found -1": [surface("<friction><ode><mu>-1</mu></ode></friction>")],

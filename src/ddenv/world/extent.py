@@ -52,7 +52,7 @@ def shape_bounds(shape: Shape, pose: Pose) -> Bounds:
         case Plane():
             half = np.zeros(3)
         case Terrain((length, width), heights):
-            lowest, highest = float(np.nanmin(heights)), float(np.nanmax(heights))
+            lowest, highest = float(heights.min()), float(heights.max())
             place = pose @ Pose((0.0, 0.0, (lowest + highest) / 2))
             return shape_bounds(Box((length, width, highest - lowest)), place)
     return center - half, center + half

@@ -76,7 +76,7 @@ class Mesh:
 class Terrain:
     """Solid ground below `heights` (R, C) m, which lie on a grid of `size` (x, y) m around its frame's origin.
 
-    Rows follow y, columns x. Between four heights the surface is bilinear; where a height is not a number there is no ground.
+    Rows follow y, columns x. Between four heights the surface is bilinear.
     Terrains are equal if they have the same `origin`, as meshes are.
     """
 

@@ -109,7 +109,7 @@ def collision(shape):
 
 
 async def test_elements_that_are_not_supported_are_left_out_once_the_user_says_so(tmp_path):
-    hill = f"<model name='hill'><static>1</static><link name='l'>{collision('<heightmap/>')}</link></model>"
+    hill = f"<model name='hill'><static>1</static><link name='l'>{collision('<image/>')}</link></model>"
     hinge = "<joint name='j' type='rope'><parent>l</parent><child>m</child></joint>"
     cart = f"<model name='cart'><link name='l'>{collision('<box><size>1 1 1</size></box>')}</link><link name='m'/>"
     models = f"<include><uri>{SHELF}</uri></include>{hill}{barrel('one', 4)}{cart}{hinge}</model>"
@@ -121,15 +121,15 @@ async def test_elements_that_are_not_supported_are_left_out_once_the_user_says_s
             "? old_shelf",
             "? barrel.dae",
             "? <joint>",
-            "? <heightmap>",
+            "? <image>",
         ]
         assert "2 missing files, 2 unsupported elements without a remedy: press m" in session.told("cost")
         await session.press("m", "home", "down", "down", "enter")
-        assert rows(session)[2:] == ["✓ <joint>  not supported, left out", "? <heightmap>  not supported, left out"]
+        assert rows(session)[2:] == ["✓ <joint>  not supported, left out", "? <image>  not supported, left out"]
         await session.press("m", "a")
         assert [row[0] for row in rows(session)] == ["✓"] * 4
         await session.place(spawn_x="0", goal_x="8")
-        assert "--ignore heightmap --ignore joint" in session.told("command")
+        assert "--ignore image --ignore joint" in session.told("command")
         # In another world it may be the ground.
         other = tmp_path / "other.world"
         other.write_bytes(path.read_bytes())

@@ -23,9 +23,13 @@ from ddenv.world.terrain import bilinear, height_at
 TOLERANCES = tuple(0.01 * 2 ** (number / 2) for number in range(16))
 MOST = 1200
 FINEST = 1 / 16  # the width of the smallest part, in cells of the grid
-# A box is as thick as fits below the surface, m.
-THICKEST, THINNEST = 1.0, 0.05
-SIDES = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
+THICKNESS = 0.2  # of a box, m
+CORNERS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
+
+
+def has_terrain(model: Model) -> bool:
+    """Whether a part of `model` is terrain."""
+    return any(isinstance(one.shape, Terrain) for one in model.collisions)
 
 
 def with_boxes(model: Model, region: Region | None, way: Region) -> Model:
@@ -63,55 +67,44 @@ def boxes(terrain: Terrain, place: Pose, region: Region | None, tolerance: float
         x, y, _ = (place @ Pose((*middle.tolist(), 0.0))).position
         if region is not None and not region.reaches((x, y), float(np.linalg.norm(half))):
             continue
-        columns, rows = (np.linspace(a, b, max(2, round(b - a) + 1)) for a, b in zip(low, high, strict=True))
         finest = (high - low).max() <= FINEST
-        heights = bilinear(terrain.heights, rows[:, None], columns)
-        found = _box(terrain, heights, middle, half, np.inf if finest else tolerance)
-        if found is None:
-            waiting += _halves(low, high, int(half.argmax()))
-        else:
+        found = _box(terrain, low, high, middle, half, np.inf if finest else tolerance)
+        if found is not None:
             yield found[0], place @ found[1]
+            continue
+        axis = half.argmax()
+        cut = (low[axis] + high[axis]) / 2
+        # Between two cells, where there are several.
+        if high[axis] - low[axis] > 1:
+            cut = np.floor(cut)
+        below, above = high.copy(), low.copy()
+        below[axis] = above[axis] = cut
+        waiting += [(low, below), (above, high)]
 
 
-def _halves(low: Floats, high: Floats, axis: int) -> list[tuple[Floats, Floats]]:
-    """Both halves of a part along an axis, cut between two cells where there are several."""
-    middle = (low[axis] + high[axis]) / 2
-    if high[axis] - low[axis] > 1:
-        middle = np.floor(middle)
-    ends, starts = high.copy(), low.copy()
-    ends[axis] = starts[axis] = middle
-    return [(low, ends), (starts, high)]
-
-
-def _box(terrain: Terrain, heights: Floats, middle: Floats, half: Floats, tolerance: float) -> tuple[Box, Pose] | None:
-    """The box below the plane that is nearest to `heights` (R, C) m of a part; None if they are farther than `tolerance` (m).
+def _box(
+    terrain: Terrain, low: Floats, high: Floats, middle: Floats, half: Floats, tolerance: float
+) -> tuple[Box, Pose] | None:
+    """The box below the plane that is nearest to the part from `low` to `high` (2,) cells; None if it is too far away.
 
     The part has its `middle` (2,) m in the frame of the terrain, and `half` the size (2,) m.
     """
-    y, x = (np.linspace(-end, end, count) for end, count in zip(half[::-1], heights.shape, strict=True))
-    slope = np.array(
-        [(heights.mean(axis=0) * x).sum() / (x * x).sum(), (heights.mean(axis=1) * y).sum() / (y * y).sum()]
-    )
-    rest = heights - slope[0] * x - slope[1] * y[:, None]
+    columns, rows = (np.linspace(*ends, max(2, round(ends[1] - ends[0]) + 1)) for ends in zip(low, high, strict=True))
+    heights = bilinear(terrain.heights, rows[:, None], columns)
+    x, y = (np.linspace(-end, end, count) for end, count in zip(half, heights.shape[::-1], strict=True))
+    slope_x = (heights.mean(axis=0) * x).sum() / (x * x).sum()
+    slope_y = (heights.mean(axis=1) * y).sum() / (y * y).sum()
+    rest = heights - slope_x * x - slope_y * y[:, None]
     if rest.max() - rest.min() > 2 * tolerance:
         return None
-    normal = np.append(-slope, 1.0) / np.sqrt(1 + slope[0] ** 2 + slope[1] ** 2)
+    normal = np.array([-slope_x, -slope_y, 1.0]) / np.sqrt(1 + slope_x**2 + slope_y**2)
     turn = pointing(vector(normal))
     axes = turn.rotation()
-    # The box covers the corners of the part on the plane.
-    corners = SIDES * half
-    reach = np.abs(np.column_stack([corners, (corners * slope).sum(axis=1)]) @ axes).max(axis=0)[:2]
+    # The box covers the whole part: on a slope it reaches farther, but must not rise above the neighbours.
+    edges = np.array([[half[0], 0.0, half[0] * slope_x], [0.0, half[1], half[1] * slope_y]])
+    reach = np.abs(edges @ axes[:, :2]).sum(axis=0)
     top = np.append(middle, (rest.max() + rest.min()) / 2)
-    rim = (SIDES * reach) @ axes[:, :2].T + top
-    # On a slope it reaches farther than the part: it must not rise above the neighbours.
-    if (_above(terrain, rim) > tolerance).any():
+    rim = (CORNERS * reach) @ axes[:, :2].T + top
+    if (rim[:, 2] - height_at(terrain, rim[:, 0], rim[:, 1]) > tolerance).any():
         return None
-    thickness = THICKEST
-    while thickness > THINNEST and (_above(terrain, rim - thickness * normal) > 0).any():
-        thickness /= 2
-    return Box(vector([*(2 * reach), thickness])), Pose(vector(top - thickness / 2 * normal), turn.quaternion)
-
-
-def _above(terrain: Terrain, places: Floats) -> Floats:
-    """How high `places` (N, 3) m are above the surface, m."""
-    return places[:, 2] - height_at(terrain, places[:, 0], places[:, 1])
+    return Box(vector([*(2 * reach), THICKNESS])), Pose(vector(top - THICKNESS / 2 * normal), turn.quaternion)

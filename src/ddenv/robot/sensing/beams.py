@@ -245,19 +245,18 @@ class Relief:
 
     def cast(self, start: Floats, way: Floats, _normal: Floats, reach: float) -> Interval:
         """Where beams from `start` (3,) along `way` (3, P), which are `reach` m long, meet the surface; they do not leave it."""
-        count = int(np.clip(math.ceil(2 * reach / self.cell), FEWEST_STEPS, MOST_STEPS))
-        along = np.linspace(0.0, reach, count + 1)[:, None]
-        x, y, z = (start[axis] + along * way[axis] for axis in range(3))
+        along = np.linspace(0.0, reach, int(np.clip(2 * reach / self.cell, FEWEST_STEPS, MOST_STEPS)))
+        x, y, z = start[:, None, None] + along[:, None] * way[:, None]
         rows, columns = self.heights.shape
         above = z - bilinear(self.heights, (y + 1) / 2 * (rows - 1), (x + 1) / 2 * (columns - 1))
         under: Booleans = above <= 0
         first = under.argmax(axis=0)
         beam = np.arange(way.shape[1])
         before, after = above[first - 1, beam], above[first, beam]
-        enter = along[first, 0] - reach / count * after / np.minimum(after - before, -NEVER)
-        met = under.any(axis=0) & (first > 0)
-        endless = np.full(way.shape[1], np.inf)
-        return np.where(met, np.where(np.isnan(enter), along[first, 0], enter), np.inf), np.where(met, endless, -np.inf)
+        enter = along[first] - along[1] * after / (after - before + NEVER)
+        # A beam that begins below the surface does not meet it, nor does one that comes from below the terrain's edge.
+        met = under.any(axis=0) & (before > 0)
+        return np.where(met, enter, np.inf), np.where(met, np.inf, -np.inf)
 
 
 CURVED: dict[type, type[Facets] | type[Relief]] = {Mesh: Facets, Terrain: Relief}

@@ -14,7 +14,7 @@ from ddenv.robot.controllers import BUILT_IN, Listener, controllers
 from ddenv.robot.drake.plant import build
 from ddenv.robot.drake.region import LeftRegion, Region
 from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.drake.terrain_boxes import with_boxes
+from ddenv.robot.drake.terrain_boxes import has_terrain, with_boxes
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import Ends, Progress, RunResult
@@ -28,7 +28,7 @@ from ddenv.robot.simulation.run import Run
 from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, solids
 from ddenv.world.drive import find_drive
 from ddenv.world.extent import with_ground_boxes
-from ddenv.world.model import Model, Terrain, World
+from ddenv.world.model import Model, World
 from ddenv.world.placement import spawn_pose
 from ddenv.world.pose import Point
 from ddenv.world.scenario import Scenario
@@ -71,11 +71,6 @@ class Template:
         # used beside such models, 23 of 274 implied tests differed.)
         self.slices = scenario.controller.use in BUILT_IN and not any(model.self_collide for model in world.models)
         moving = [model for model in world.models if not model.static]
-        self._terrains = {
-            model.name: model
-            for model in world.models
-            if any(isinstance(one.shape, Terrain) for one in model.collisions)
-        }
         self._way = Region.of((spawn.x, spawn.y), (goal.x, goal.y), ())
         self._surround(Region.of((spawn.x, spawn.y), (goal.x, goal.y), moving))
         self._build(names)
@@ -109,16 +104,16 @@ class Template:
     def _surround(self, region: Region) -> None:
         """From the next `_build` on, the plant has nothing outside `region` that never moves."""
         self._region = region
-        everywhere = self._reach >= ENDLESS
-        self._far = frozenset() if everywhere else region.far(self._solid.models)
-        bounded = None if everywhere else region
-        self._grounds = {name: with_boxes(model, bounded, self._way) for name, model in self._terrains.items()}
+        bounded = None if self._reach >= ENDLESS else region
+        models = self._solid.models
+        self._far = frozenset() if bounded is None else region.far(models)
+        self._grounds = {one.name: with_boxes(one, bounded, self._way) for one in models if has_terrain(one)}
 
     def _build(self, names: frozenset[str]) -> None:
         """Builds the plant with the models `names`. Everything else stays that of the whole world."""
         self.names = names
-        near = (model for model in self._solid.models if model.name in names - self._far)
-        near = (self._grounds.get(model.name, model) for model in near)
+        near = [model for model in self._solid.models if model.name in names - self._far]
+        near = [self._grounds.get(model.name, model) for model in near]
         world, scenario = replace(self._solid, models=tuple(near)), self._scenario
         try:
             built = build(world, self._robot, self._drive, scenario.simulation, scenario.controller.motor_gain)
@@ -129,9 +124,8 @@ class Template:
                 f"robot '{self._robot.name}': its first link must be free to move, not joined to the world or another link"
             )
         at = spawn_pose(scenario.robot.spawn) @ self._robot.pose.inverse()
-        self.context = RunContext(
-            built, at, self._clock, self._whole.floor, self._region if self._far or self._grounds else None
-        )
+        watched = self._region if self._far or self._grounds else None
+        self.context = RunContext(built, at, self._clock, self._whole.floor, watched)
         self.rehearsals = Rehearsals(self.repertoire, self.context)
 
     def run(

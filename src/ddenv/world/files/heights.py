@@ -57,12 +57,12 @@ def _check_size(columns: int, rows: int) -> None:
 
 def unpack_heights(packed: bytes) -> Floats:
     """The packed heights (R, C), as a share of the greatest. Raises Unusable for damaged bytes."""
-    known = len(packed) >= _HEADER.size and packed.startswith(_MAGIC)
-    _, rows, columns = _HEADER.unpack_from(packed) if known else (b"", 0, 0)
-    _check_size(columns, rows)
-    if len(packed) != _HEADER.size + 2 * rows * columns:
+    if len(packed) < _HEADER.size:
         raise Unusable("its stored heights are damaged")
-    samples = np.frombuffer(packed, "<u2", rows * columns, _HEADER.size).reshape(rows, columns)
+    magic, rows, columns = _HEADER.unpack_from(packed)
+    if magic != _MAGIC or min(rows, columns) < 2 or len(packed) != _HEADER.size + 2 * rows * columns:
+        raise Unusable("its stored heights are damaged")
+    samples = np.frombuffer(packed, "<u2", offset=_HEADER.size).reshape(rows, columns)
     heights: Floats = samples / max(1, int(samples.max()))
     heights.flags.writeable = False
     return heights
