@@ -26,6 +26,7 @@ from ddenv.world.model import (
     Plane,
     Shape,
     Sphere,
+    Terrain,
     World,
 )
 from ddenv.world.placement import (
@@ -176,6 +177,20 @@ def test_a_slope_is_below_the_robot_where_it_goes_down():
     check_spawn(slope, HUSKY, Spawn(x=5, y=0, z=0.2))
     with pytest.raises(UserError, match="inside model 'thing' by"):
         check_spawn(slope, HUSKY, Spawn(x=-5, y=0, z=0.2))
+
+
+def test_the_start_on_terrain_is_at_its_height():
+    slope = Terrain((20.0, 20.0), np.broadcast_to(np.linspace(0.0, 4.0, 11), (11, 11)), "slope")
+    hill = world_with(slope, Pose((0.0, 0.0, 1.0)))
+    with pytest.raises(UserError, match="inside model 'thing' by .*free nearby: ") as caught:
+        check_spawn(hill, HUSKY, Spawn(x=0, y=0, z=0.2))
+    free = Spawn(**dict(zip("xyz", map(float, str(caught.value).partition("--spawn=")[2].split(",")), strict=False)))
+    check_spawn(hill, HUSKY, free)
+    assert (free.x, free.y) == (0, 0)
+    assert drop(hill, HUSKY, free) < 0.03
+    assert drop(hill, HUSKY, free.model_copy(update={"z": free.z + 1})) == pytest.approx(1.0, abs=0.03)
+    # Beyond its edge there is nothing.
+    assert drop(hill, HUSKY, Spawn(x=15, y=0, z=9)) == 0.0
 
 
 def test_a_robot_without_shapes_cannot_start():

@@ -16,7 +16,7 @@ from ddenv.robot.drake.region import Region
 from ddenv.robot.drake.terrain_boxes import MOST, TOLERANCES, boxes
 from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.template import Template, Variants
-from ddenv.world.model import Box, Collision, Shape, Terrain, World
+from ddenv.world.model import Box, Shape, Terrain, World
 from ddenv.world.pose import HERE, Pose
 from ddenv.world.terrain import height_at
 from tests.robot.conftest import bits, link_of, model_of

@@ -139,7 +139,7 @@ def _extent(shape: Shape) -> tuple[Vector, Vector]:
 # Added to divisors that may be 0: a beam along a face then crosses it, but far away. It is too small to change anything else.
 NEVER = 1e-200
 # In how many steps a beam is followed along terrain.
-FEWEST_STEPS, MOST_STEPS = 16, 200
+FEWEST_STEPS, MOST_STEPS = 20, 200
 SHORTEST = 1e-9  # the minimum half length of a capsule's straight part, as a part of its radius
 
 Interval = tuple[Floats, Floats]
@@ -245,7 +245,7 @@ class Relief:
 
     def cast(self, start: Floats, way: Floats, _normal: Floats, reach: float) -> Interval:
         """Where beams from `start` (3,) along `way` (3, P), which are `reach` m long, meet the surface; they do not leave it."""
-        along = np.linspace(0.0, reach, int(np.clip(2 * reach / self.cell, FEWEST_STEPS, MOST_STEPS)))
+        along = np.linspace(0.0, reach, int(np.clip(reach / self.cell, FEWEST_STEPS, MOST_STEPS)))
         x, y, z = start[:, None, None] + along[:, None] * way[:, None]
         rows, columns = self.heights.shape
         above = z - bilinear(self.heights, (y + 1) / 2 * (rows - 1), (x + 1) / 2 * (columns - 1))
