@@ -182,7 +182,7 @@ def test_a_slope_is_below_the_robot_where_it_goes_down():
 def test_the_start_on_terrain_is_at_its_height():
     slope = Terrain((20.0, 20.0), np.broadcast_to(np.linspace(0.0, 4.0, 11), (11, 11)), "slope")
     hill = world_with(slope, Pose((0.0, 0.0, 1.0)))
-    with pytest.raises(UserError, match="inside model 'thing' by .*free nearby: ") as caught:
+    with pytest.raises(UserError, match=r"inside model 'thing' by .*free nearby: ") as caught:
         check_spawn(hill, HUSKY, Spawn(x=0, y=0, z=0.2))
     free = Spawn(**dict(zip("xyz", map(float, str(caught.value).partition("--spawn=")[2].split(",")), strict=False)))
     check_spawn(hill, HUSKY, free)

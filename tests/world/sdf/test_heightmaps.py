@@ -1,13 +1,15 @@
-"""A `<heightmap>` is solid ground: where its heights are, what is in the run file, and which images are refused."""
+"""Heightmaps and meshes that are solid ground: where its heights are, what is in the run file, and which images are refused."""
 
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 
 from ddenv.errors import UserError
@@ -98,3 +100,58 @@ def test_an_image_of_400_million_pixels_is_refused_before_it_is_decoded(read, tm
     (tmp_path / "hill.png").write_bytes(bytes(header))
     with pytest.raises(UserError, match="is wider or higher than 4097 pixels"):
         read(heightmap())
+
+
+def surface(height: Callable[[np.ndarray, np.ndarray], np.ndarray], count: int = 61) -> trimesh.Trimesh:
+    """A mesh of 20 x 12 m that each vertical line meets once, its vertices at random places."""
+    random = np.random.default_rng(1)
+    along, across = np.linspace(0, 20, count), np.linspace(0, 12, count)
+    x, y = np.meshgrid(along, across)
+    x[:, 1:-1] += random.uniform(-0.05, 0.05, x[:, 1:-1].shape)
+    y[1:-1] += random.uniform(-0.05, 0.05, y[1:-1].shape)
+    number = np.arange(count * count).reshape(count, count)
+    first, beside, above, across = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
+    faces = np.stack([first, beside, across, first, across, above], axis=-1).reshape(-1, 3)
+    return trimesh.Trimesh(np.column_stack([x.ravel(), y.ravel(), height(x, y).ravel()]), faces, process=False)
+
+
+def hill(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return 5 + 0.5 * np.sin(x / 2) * np.cos(y / 3)
+
+
+MESH = "<geometry><mesh><uri>ground.obj</uri>{}</mesh></geometry>"
+GROUND = "<model name='m'><static>true</static><link name='l'><collision name='c'>{}</collision></link></model>"
+
+
+def test_a_mesh_that_is_a_surface_is_solid_ground_below_it(read, tmp_path):
+    mesh = surface(hill)
+    mesh.export(tmp_path / "ground.obj")
+    world = read(GROUND.format(MESH.format("<scale>1 2 1</scale>")))
+    (one,) = world.models[0].collisions
+    assert is_ground(world.models[0])
+    places, _ = trimesh.sample.sample_surface(mesh, 2000, seed=1)
+    local = places * (1, 2, 1) - one.pose.position
+    found = height_at(one.shape, local[:, 0], local[:, 1])
+    assert found == pytest.approx(local[:, 2], abs=0.011)
+    again = parse_world(world.text, world.path, resources=Resources(world.resources))
+    assert again.models == world.models
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        trimesh.util.concatenate([surface(hill), surface(lambda x, y: hill(x, y) + 2)]),
+        surface(lambda x, y: hill(x, y) + 0.5 * np.random.default_rng(2).random(x.shape)),
+        surface(hill, 9),
+        surface(lambda x, y: 0 * x),
+        trimesh.Trimesh(surface(hill).vertices, surface(hill).faces[:-900], process=False),
+        trimesh.creation.icosphere(4, 9.0),
+    ],
+    ids=["two layers", "rocks", "a roof", "a floor", "with a gap", "a ball"],
+)
+def test_other_meshes_are_no_ground(read, tmp_path, mesh):
+    mesh.export(tmp_path / "ground.obj")
+    world = read(GROUND.format(MESH.format("")))
+    assert not is_ground(world.models[0])
+    again = parse_world(world.text, world.path, resources=Resources(world.resources))
+    assert again.models == world.models and again.absent == ()

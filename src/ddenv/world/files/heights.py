@@ -44,9 +44,13 @@ def read_heights(path: Path) -> bytes:
         raise Unusable("is no image that can be read; use a PNG of 8 or 16 bits") from None
     except (OSError, SyntaxError, ValueError, EOFError, struct.error) as error:
         raise Unusable(f"is no valid image: {' '.join(str(error).split())[:200]}") from None
-    rows, columns = samples.shape
-    kept: bytes = np.clip(samples[::-1], 0, 65535).astype("<u2").tobytes()
-    return _HEADER.pack(_MAGIC, rows, columns) + kept
+    return pack_heights(samples[::-1] / max(1, int(samples.max())))
+
+
+def pack_heights(shares: Floats) -> bytes:
+    """Heights (R, C), as a share of the greatest."""
+    kept: bytes = shares.astype("<f4").tobytes()
+    return _HEADER.pack(_MAGIC, *shares.shape) + kept
 
 
 def _check_size(columns: int, rows: int) -> None:
@@ -57,12 +61,15 @@ def _check_size(columns: int, rows: int) -> None:
 
 def unpack_heights(packed: bytes) -> Floats:
     """The packed heights (R, C), as a share of the greatest. Raises Unusable for damaged bytes."""
+    damaged = Unusable("its stored heights are damaged")
     if len(packed) < _HEADER.size:
-        raise Unusable("its stored heights are damaged")
+        raise damaged
     magic, rows, columns = _HEADER.unpack_from(packed)
-    if magic != _MAGIC or min(rows, columns) < 2 or len(packed) != _HEADER.size + 2 * rows * columns:
-        raise Unusable("its stored heights are damaged")
-    samples = np.frombuffer(packed, "<u2", offset=_HEADER.size).reshape(rows, columns)
-    heights: Floats = samples / max(1, int(samples.max()))
-    heights.flags.writeable = False
-    return heights
+    if magic != _MAGIC or min(rows, columns) < 2 or len(packed) != _HEADER.size + 4 * rows * columns:
+        raise damaged
+    shares = np.frombuffer(packed, "<f4", offset=_HEADER.size).reshape(rows, columns).astype(np.float64)
+    # So it is where one is not a number.
+    if not np.abs(shares - 0.5).max() <= 0.5:
+        raise damaged
+    shares.flags.writeable = False
+    return shares

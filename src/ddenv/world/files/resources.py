@@ -11,17 +11,20 @@ import os
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
+
+import numpy as np
 
 from ddenv.arrays import Floats
 from ddenv.text import first_of
 from ddenv.world.access import Missing, Unusable, folders_of, is_file, is_folder, read, reason, xml_root
 from ddenv.world.files.fuel import GAZEBO, FuelModel, cached, caches, hosts, in_fuel, newest, refuse_link_out
 from ddenv.world.files.heights import read_heights, unpack_heights
-from ddenv.world.files.meshes import build, read_parts, unpack, unpack_pieces
+from ddenv.world.files.meshes import build, read_parts, surface_of, unpack, unpack_pieces
 from ddenv.world.files.roots import absolute, source_of
 from ddenv.world.files.triangles import Part
 from ddenv.world.model import Found, Mesh
@@ -106,12 +109,18 @@ class Resources:
     def heights(self, part: MeshPart) -> Floats:
         """The heights (R, C) in an image, as a share of the greatest; the first row has the least y."""
         self.asked[part.uri, part.base] = None
-        key = part.key("heightmap")
+        find = partial(self._find, part.uri, part.base, model=False)
+        return self._unpacked(part.key("heightmap"), lambda folders: read_heights(find(folders)))
+
+    def ground(self, part: MeshPart, scale: Vector) -> Floats:
+        """The heights (R, C) of a mesh that is ground, times `scale`, as a share of those of the box around it."""
+        key = part.key("ground", scale)
+        if self._folders is None and key not in self.taken:
+            raise Unusable("was no ground when the world was read")
+        return self._unpacked(key, lambda folders: _heights_of(self._parts(part, folders), part, scale))
+
+    def _unpacked(self, key: str, ask: Callable[[Mapping[Path, str]], bytes]) -> Floats:
         if key not in self._heights:
-
-            def ask(folders: Mapping[Path, str]) -> bytes:
-                return read_heights(self._find(part.uri, part.base, folders, model=False))
-
             self._heights[key] = unpack_heights(self._bytes(key, ask))
         return self._heights[key]
 
@@ -126,7 +135,7 @@ class Resources:
         """Makes the meshes and images called `uri` in files of `folder` also known as `new` in files of `new_folder`."""
         for key, content in list(self.taken.items()):
             kind, *names = json.loads(key)
-            if kind in ("mesh", "pieces", "heightmap") and names[:2] == [uri, folder]:
+            if kind in ("mesh", "pieces", "heightmap", "ground") and names[:2] == [uri, folder]:
                 self.taken[json.dumps([kind, new, new_folder, *names[2:]])] = content
 
     def _bytes(self, key: str, ask: Callable[[Mapping[Path, str]], bytes]) -> bytes:
@@ -185,6 +194,14 @@ def _cut(parts: list[Part], part: MeshPart, scale: Vector, most: int) -> bytes:
     from ddenv.world.files.pieces import build_pieces
 
     return build_pieces(parts, part.submesh, part.center, scale, most)
+
+
+def _heights_of(parts: list[Part], part: MeshPart, scale: Vector) -> bytes:
+    # Loaded late, too.
+    from ddenv.world.files.surfaces import surface_heights
+
+    vertices, faces = surface_of(parts, part.submesh, part.center)
+    return surface_heights((vertices * np.array(scale), faces))
 
 
 def _size(parts: Sequence[Part]) -> int:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ddenv.arrays import Floats
 from ddenv.text import Names
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.extent import circle, convex_hull, polygon_area
@@ -171,15 +172,28 @@ def _terrain(element: Element, context: Context, scale: Vector) -> Placed:
     except (Missing, Unusable) as error:
         what = "is not available" if isinstance(error, Missing) else "is unreadable"
         raise refuse(element, "heightmap", f"heightmap '{uri[:200]}' {what}: {error}") from None
+    middle = (0.0, 0.0, 0.0) if place is None else _times(vector(numbers(place, 3)), scale)
+    return _ground(uri, shares, size, middle)
+
+
+def _ground(uri: str, shares: Floats, size: Vector, middle: Vector) -> Placed:
+    """The ground that `shares` (R, C) of the height of a box give, which has its bottom's `middle` (m) there."""
     digest = hashlib.blake2b(shares.tobytes(), digest_size=8).hexdigest()
-    terrain = Terrain(size[:2], shares * size[2], f"{uri} {digest} {size}")
-    return Placed(terrain, HERE if place is None else Pose(_times(vector(numbers(place, 3)), scale)))
+    return Placed(Terrain(size[:2], shares * size[2], f"{uri} {digest} {size}"), Pose(middle))
 
 
 def _solid(part: MeshPart, element: Element, parent: Element, context: Context, scale: Vector) -> Placed:
     """What collides in place of a mesh: its convex pieces, or its hull. Raises Missing, Unusable and UserError."""
     hull = _scaled_mesh(context.resources.mesh(part, convex=True), scale, element)
     most = _most_pieces(element, parent, context)
+    try:
+        shares = context.resources.ground(part, scale) if most > 1 else None
+    except (Missing, Unusable):
+        shares = None
+    if shares is not None:
+        low, high = hull.vertices.min(axis=0), hull.vertices.max(axis=0)
+        context.note("replaced", element, f"'{part.uri}' by the solid ground below it")
+        return _ground(part.uri, shares, vector(high - low), vector([*(low + high)[:2] / 2, low[2]]))
     pieces = context.resources.pieces(part, scale, most) if most > 1 else []
     if len(pieces) == 1 and (box := box_of(hull)) is not None:
         return Placed(*box)

@@ -1,0 +1,45 @@
+"""Meshes that are ground: large open surfaces that each vertical line meets once become heights, as those of a heightmap."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ddenv.world.access import Unusable
+from ddenv.world.files.heights import pack_heights
+from ddenv.world.files.meshes import Surface
+from ddenv.world.terrain import bilinear
+
+LARGE = 8.0  # m along both sides
+FINE = 256  # triangles; a roof has fewer
+LEVEL = 0.02  # less height than this is a flat floor, m
+GAPS = 0.01  # the share of its rectangle that a surface may leave empty, or cover twice
+OFF = 0.01  # how far the heights may be from the mesh, m
+COUNTS = (33, 129, 513, 1025)  # of heights along the longer side: the first that is fine enough
+
+
+def surface_heights(surface: Surface) -> bytes:
+    """The heights of a mesh that is ground, packed. Raises Unusable for any other."""
+    # Loaded late, as scipy is everywhere.
+    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+    vertices, faces = surface
+    low = vertices.min(axis=0)
+    size = np.ptp(vertices, axis=0)
+    corners = vertices[faces]
+    covered = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]).sum() / 2
+    uneven = abs(covered / max(size[0] * size[1], 1e-12) - 1) > GAPS
+    if uneven or size[:2].min() < LARGE or size[2] < LEVEL or len(faces) < FINE:
+        raise Unusable("is no ground")
+    inside, beside = (kind(vertices[:, :2], vertices[:, 2]) for kind in (LinearNDInterpolator, NearestNDInterpolator))
+    checked = np.vstack([vertices, corners.mean(axis=1)])
+    # Rounding must not lead beyond the edge.
+    shares = (checked[:, :2] - low[:2]) / size[:2] * (1 - 1e-12)
+    for most in COUNTS:
+        counts = np.maximum(np.ceil(most * size[:2] / size[:2].max()).astype(int), 2)
+        x, y = np.meshgrid(*map(np.linspace, low[:2], low[:2] + size[:2], counts))
+        heights = inside(x, y)
+        heights = np.where(np.isnan(heights), beside(x, y), heights)
+        columns, rows = (shares * (counts - 1)).T
+        if np.abs(bilinear(heights, rows, columns) - checked[:, 2]).max() <= OFF:
+            return pack_heights(np.clip((heights - low[2]) / size[2], 0.0, 1.0))
+    raise Unusable("is too rough for a grid of heights")
