@@ -16,7 +16,6 @@ from ddenv.world.model import (
     Collision,
     Cylinder,
     Ellipsoid,
-    Ground,
     Link,
     Mesh,
     Model,
@@ -95,10 +94,9 @@ def circle(sides: int) -> np.ndarray:
 def filled_bounds(collision: Collision) -> Bounds:
     """The box around what a shape fills: all that is below a plane or terrain, everything if a plane leans."""
     low, high = shape_bounds(collision.shape, collision.pose)
-    if not isinstance(collision.shape, Ground):
-        return low, high
     if isinstance(collision.shape, Terrain):
         low[2] = -np.inf
+    if not isinstance(collision.shape, Plane):
         return low, high
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     if collision.pose.rotation()[2, 2] > 1 - 1e-9:

@@ -15,13 +15,15 @@ FINE = 256  # triangles; a roof has fewer
 LEVEL = 0.02  # less height than this is a flat floor, m
 GAPS = 0.01  # the share of its rectangle that a surface may leave empty, or cover twice
 OFF = 0.01  # how far the heights may be from the mesh, m
+# The share of the sides beside the edges in which no height is taken: numbers in files are rounded.
+EDGE = 1e-5
 COUNTS = (33, 129, 513, 1025)  # of heights along the longer side: the first that is fine enough
 
 
 def surface_heights(surface: Surface) -> bytes:
     """The heights of a mesh that is ground, packed. Raises Unusable for any other."""
     # Loaded late, as scipy is everywhere.
-    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+    from scipy.interpolate import LinearNDInterpolator
 
     vertices, faces = surface
     low = vertices.min(axis=0)
@@ -31,18 +33,15 @@ def surface_heights(surface: Surface) -> bytes:
     uneven = abs(covered / max(size[0] * size[1], 1e-12) - 1) > GAPS
     if uneven or size[:2].min() < LARGE or size[2] < LEVEL or len(faces) < FINE:
         raise Unusable("is no ground")
-    inside, beside = (kind(vertices[:, :2], vertices[:, 2]) for kind in (LinearNDInterpolator, NearestNDInterpolator))
+    interpolate = LinearNDInterpolator(vertices[:, :2], vertices[:, 2])
     checked = np.vstack([vertices, corners.mean(axis=1)])
-    # Rounding must not lead beyond the edge.
-    shares = (checked[:, :2] - low[:2]) / size[:2] * (1 - 1e-12)
+    shares = np.clip((checked[:, :2] - low[:2]) / size[:2], EDGE, 1 - EDGE)
     for most in COUNTS:
         counts = np.maximum(np.ceil(most * size[:2] / size[:2].max()).astype(int), 2)
-        x, y = np.meshgrid(*map(np.linspace, low[:2], low[:2] + size[:2], counts))
+        x, y = (np.linspace(EDGE, 1 - EDGE, count) for count in counts)
         # With more threads its many small equations take up to a hundred times as long.
         with threadpool_limits(1):
-            heights = inside(x, y)
-        outside = np.isnan(heights)
-        heights[outside] = beside(x[outside], y[outside])
+            heights = interpolate(low[0] + x * size[0], low[1] + y[:, None] * size[1])
         columns, rows = (shares * (counts - 1)).T
         if np.abs(bilinear(heights, rows, columns) - checked[:, 2]).max() <= OFF:
             return pack_heights(np.clip((heights - low[2]) / size[2], 0.0, 1.0))
