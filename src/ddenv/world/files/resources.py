@@ -39,7 +39,8 @@ class Resources:
 
     def __init__(self, taken: Mapping[str, bytes], folders: Mapping[Path, str] | None = None) -> None:
         self.taken = dict(taken)
-        self._folders = folders
+        self._reads_disk = folders is not None
+        self._folders = folders or {}
         self._files: dict[str, tuple[Path, bytes]] = {}
         self._meshes: dict[str, Mesh] = {}
         self._failed: dict[str, Missing | Unusable] = {}
@@ -55,7 +56,7 @@ class Resources:
         self.asked[uri, base] = None
         key = json.dumps(["sdf", uri, str(base)])
         if key not in self._files:
-            path, end, text = self._bytes(key, lambda folders: self._sdf(uri, base, folders)).partition(b"\0")
+            path, end, text = self._bytes(key, lambda: self._sdf(uri, base)).partition(b"\0")
             if not end or not path:
                 raise Unusable("its stored file is damaged")
             self._files[key] = Path(path.decode("utf-8", "surrogateescape")), text
@@ -67,15 +68,20 @@ class Resources:
         way: list[Any] = [submesh, center, convex]
         key = json.dumps(["mesh", uri, str(base), *way])
         if key not in self._meshes:
-            packed = self._bytes(key, lambda folders: self._mesh(uri, base, folders, *way))
+            packed = self._bytes(key, lambda: build(self._parts(self._find(uri, base, model=False)), *way))
             self._meshes[key] = unpack(json.dumps([uri, *way]), packed)
         return self._meshes[key]
 
     def config_fault(self, folder: Path) -> str:
         """Why the model.config in the folder of a model cannot be read, so that its model.sdf is taken; empty if it can."""
         key = json.dumps(["config", str(folder)])
-        if key not in self.taken and self._folders is not None and (fault := _config_fault(folder)):
-            self.taken[key] = fault.encode()
+        if key not in self.taken and self._reads_disk:
+            try:
+                _model_config(folder)
+            except Unusable as error:
+                self.taken[key] = str(error).encode()
+            except Missing:
+                return ""
         return self.taken.get(key, b"").decode("utf-8", "replace")
 
     def rename(self, uri: str, folder: str, new: str, new_folder: str) -> None:
@@ -85,15 +91,15 @@ class Resources:
             if [kind, *names] == ["mesh", uri, folder]:
                 self.taken[json.dumps([kind, new, new_folder, submesh, center, convex])] = content
 
-    def _bytes(self, key: str, ask: Callable[[Mapping[Path, str]], bytes]) -> bytes:
+    def _bytes(self, key: str, from_disk: Callable[[], bytes]) -> bytes:
         if key in self._failed:
             # A new exception each time: an exception raised again would collect a traceback of all its uses.
             raise type(self._failed[key])(str(self._failed[key]))
         if key not in self.taken:
-            if self._folders is None:
+            if not self._reads_disk:
                 raise Missing("was not found when the world was read")
             try:
-                self.taken[key] = ask(self._folders)
+                self.taken[key] = from_disk()
             except (Missing, Unusable) as error:
                 self._failed[key] = error
                 raise
@@ -104,24 +110,20 @@ class Resources:
         missing = [json.loads(key)[1] for key, error in self._failed.items() if isinstance(error, Missing)]
         return tuple(dict.fromkeys(missing))
 
-    def _find(self, uri: str, base: Path, folders: Mapping[Path, str], *, model: bool) -> Path:
+    def _find(self, uri: str, base: Path, *, model: bool) -> Path:
         """The file that `uri` refers to, by its folder if it is a `model`."""
-        path = find(uri, base, folders)
+        path = find(uri, base, self._folders)
         if model and is_folder(path):
             path = model_file(path)
         refuse_link_out(path)
-        roots = {**folders, **dict.fromkeys(map(absolute, caches()), "Fuel's cache")}
+        roots = {**self._folders, **dict.fromkeys(map(absolute, caches()), "Fuel's cache")}
         self.found[uri, base] = Found(uri, path, *source_of(path, roots))
         return path
 
-    def _mesh(self, uri: str, base: Path, folders: Mapping[Path, str], *way: Any) -> bytes:
-        path = self._find(uri, base, folders, model=False)
-        return build(self._parts(path), *way)
-
-    def _sdf(self, uri: str, base: Path, folders: Mapping[Path, str]) -> bytes:
+    def _sdf(self, uri: str, base: Path) -> bytes:
         """The bytes to be stored for an SDF file: its path, a NUL byte, its content."""
         try:
-            path = self._find(uri, base, folders, model=True)
+            path = self._find(uri, base, model=True)
             text = read(path, SDF_LIMIT)
         except Missing:
             name = model_named(uri)
@@ -172,11 +174,9 @@ _ABSENT = (errno.ENOENT, errno.ENOTDIR)
 
 def model_named(uri: str) -> str:
     """The model that `uri` names, such as `construction_barrel`, as its folder in Gazebo is called; "" if it names none."""
-    match = _SCHEME.fullmatch(uri.strip())
-    if match is None:
-        return ""
-    rest, name = unquote(match[2], errors="replace"), ""
-    if match[1].lower() in ("model", "package"):
+    scheme, rest = _decoded(uri)
+    name = ""
+    if scheme in ("model", "package"):
         name = rest.strip("/").split("/")[0]
     elif (model := fuel_model(uri)) is not None and model.kind == "models":
         name = model.name
@@ -185,10 +185,8 @@ def model_named(uri: str) -> str:
 
 def fuel_model(uri: str) -> FuelModel | None:
     """The model in Fuel that `uri`, or the file that it names, belongs to; None if it is no such URL."""
-    match = _SCHEME.fullmatch(uri.strip())
-    if match is None or match[1].lower() not in ("http", "https"):
-        return None
-    found = in_fuel(unquote(match[2], errors="surrogateescape"))
+    scheme, rest = _decoded(uri)
+    found = in_fuel(rest) if scheme in ("http", "https") else None
     return None if found is None else found[0]
 
 
@@ -207,7 +205,11 @@ def find(uri: str, base: Path, folders: Collection[Path]) -> Path:
 
     Raises Missing if there is none, and Unusable if the URI is invalid or not supported.
     """
-    scheme, rest = _split(uri.strip())
+    scheme, rest = _decoded(uri)
+    if not rest.strip("/ "):
+        raise Unusable("names no file")
+    if "\0" in rest:
+        raise Unusable("has a NUL byte")
     if scheme in ("model", "package"):
         path = _inside(rest)
         where = f"looked in {_listed(folders)} and the Fuel cache"
@@ -226,16 +228,12 @@ def find(uri: str, base: Path, folders: Collection[Path]) -> Path:
     return _first(staying, f"looked beside the file that names it and in {_listed(folders)}")
 
 
-def _split(uri: str) -> tuple[str, str]:
-    """The scheme in lower case (empty for a plain path) and the rest, percent-decoded. Raises Unusable."""
+def _decoded(uri: str) -> tuple[str, str]:
+    """The scheme in lower case (empty for a plain path) and the rest, percent-decoded."""
+    uri = uri.strip()
     match = _SCHEME.fullmatch(uri)
     scheme, rest = ("", uri) if match is None else (match[1].lower(), match[2].removeprefix("//"))
-    rest = unquote(rest, errors="surrogateescape")
-    if not rest.strip("/ "):
-        raise Unusable("names no file")
-    if "\0" in rest:
-        raise Unusable("has a NUL byte")
-    return scheme, rest
+    return scheme, unquote(rest, errors="surrogateescape")
 
 
 def _inside(rest: str) -> str:
@@ -329,34 +327,24 @@ def model_file(folder: Path) -> Path:
     Raises Unusable if a model.config cannot be read and there is no model.sdf, or if it names a file outside of the folder;
     Missing if there is no SDF file.
     """
+    usual = folder / "model.sdf"
     try:
         config = _model_config(folder)
     except Unusable as error:
-        if not is_file(folder / "model.sdf"):
-            raise Unusable(f"model.config: {error}") from None
-        config = None
+        if is_file(usual):
+            return usual
+        raise Unusable(f"model.config: {error}") from None
     except Missing:
-        return _first([folder / "model.sdf"], f"{folder} has neither model.config nor model.sdf")
-    name = "model.sdf" if config is None else _newest_file(config)
+        return _first([usual], f"{folder} has neither model.config nor model.sdf")
+    name = _newest_file(config)
     if not name:
-        return _first([folder / "model.sdf"], "model.config names no file for SDF 1.12 or older")
+        return _first([usual], "model.config names no file for SDF 1.12 or older")
     return _first([folder / name], f"model.config names '{name[:60]}', which does not exist")
 
 
 def _model_config(folder: Path) -> Element:
     """The root of the model.config in `folder`. Raises Unusable if it cannot be read, and Missing if there is none."""
     return xml_root(read(_first([folder / "model.config"], ""), MODEL_CONFIG_LIMIT))
-
-
-def _config_fault(folder: Path) -> str:
-    """Why the model.config in `folder` cannot be read; empty if it can, or if there is none."""
-    try:
-        _model_config(folder)
-    except Unusable as error:
-        return str(error)
-    except Missing:
-        return ""
-    return ""
 
 
 def _newest_file(config: Element) -> str:
