@@ -68,8 +68,7 @@ def _given(
     if place is not None and (place.get("relative_to") or place.get("frame")):
         context.note("ignored", place, "the centre of mass is read in the frame of its link")
     if tensor is not None:
-        moments = vector(number_or_nan(tensor, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
-        products = vector(number_or_nan(tensor, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
+        moments, products = moments_of(tensor)
         if possible := _possible(moments, products):
             return Inertia(mass, link_pose @ pose, possible, products)
     said = "no <inertia>"
@@ -78,6 +77,20 @@ def _given(
         said = f"moments {' '.join(words)} kg m^2 are impossible"
     context.note("replaced", element, f"{said}: computed from its shapes and its mass of {mass:g} kg")
     return spread(collisions, density, link_pose, mass)
+
+
+def moments_of(inertia: Element) -> tuple[Vector, Vector]:
+    """The moments ixx, iyy, izz and the products ixy, ixz, iyz in an `<inertia>`, kg m^2; NaN for what is no number."""
+    moments = vector(number_or_nan(inertia, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
+    products = vector(number_or_nan(inertia, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
+    return moments, products
+
+
+def tensor_of(moments: Vector, products: Vector) -> np.ndarray:
+    """The matrix (3, 3) of moments and products of inertia."""
+    xx, yy, zz = moments
+    xy, xz, yz = products
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def read_density(parent: Element, default: float) -> float:
@@ -103,9 +116,7 @@ def _possible(moments: Vector, products: Vector) -> Vector | None:
 
 def _principal(moments: Vector, products: Vector) -> Vector:
     """The principal moments in ascending order; NaN for unusable numbers."""
-    xx, yy, zz = moments
-    xy, xz, yz = products
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    tensor = tensor_of(moments, products)
     if not np.isfinite(tensor).all() or np.abs(tensor).max() > HEAVIEST:
         return math.nan, math.nan, math.nan
     low, middle, high = np.linalg.eigvalsh(tensor).tolist()
