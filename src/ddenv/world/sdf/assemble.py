@@ -63,7 +63,7 @@ def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context
         self_collide=any(builder.self_collide),
     )
     if is_empty or len(still_links(model)) == len(model.links):
-        return _still(model)
+        return still(model)
     check_tree(builder.joints, part.element)
     # These settings differ between links, but are simulated for the model as a whole.
     if any(pulled) and not all(pulled):
@@ -74,10 +74,10 @@ def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context
     if not is_ground(model):
         return without_ball_joints(model, part.element, context)
     context.note("replaced", part.element, "static, since an infinite plane does not move")
-    return _still(model)
+    return still(model)
 
 
-def _still(model: Model) -> Model:
+def still(model: Model) -> Model:
     """`model`, static."""
     links = tuple(replace(link, inertia=None) for link in model.links)
     return replace(model, static=True, links=links, joints=(), gravity=True)

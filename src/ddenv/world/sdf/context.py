@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -11,7 +11,7 @@ from ddenv.errors import UserError
 from ddenv.settings import Ignorable
 from ddenv.world.access import MissingFiles, Unsupported
 from ddenv.world.files.resources import Resources, how_to_fetch
-from ddenv.world.model import Note
+from ddenv.world.model import Note, World
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.standin import ALL_MISSING, AUTO, StandIn, matching, parse_stand_ins
 from ddenv.world.sdf.xml import Element, complain, floats, parse, place
@@ -117,6 +117,17 @@ class Context:
         # `auto` asks for nothing as long as nothing is missing.
         for uri in sorted(uri for uri, own in self.stand_ins.items() if own != AUTO and uri not in self.used):
             self.note("ignored", root, f"the stand-in for '{uri}' is not used: no model or mesh names it")
+
+    def recorded(self, world: World) -> World:
+        """`world`, with what was noted, found and guessed as it was read."""
+        return replace(
+            world,
+            notes=tuple(self.notes),
+            resources=self.resources.taken,
+            found=tuple(self.resources.found.values()),
+            absent=self.resources.absent(),
+            guessed=tuple(self.guessed),
+        )
 
     def complain_of_missing(self) -> None:
         """Raises MissingFiles with the first error, and the names of the other files."""

@@ -21,7 +21,7 @@ from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.text import printable
 from ddenv.world.access import Missing, Unusable, not_yaml
-from ddenv.world.pose import Pose
+from ddenv.world.pose import HERE, Pose, turn, vector
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import FARTHEST
 
@@ -80,8 +80,10 @@ class Source:
             raise self.complain(node, "expected a name or a file")
         return str(node.value)
 
-    def pairs(self, node: Node) -> dict[str, Node]:
-        """The values of a mapping by key. Raises UserError for anything else, and for a key that stands twice."""
+    def pairs(self, node: Node | None) -> dict[str, Node]:
+        """The values of a mapping by key; none without one. Raises UserError for anything else, and for a key that stands twice."""
+        if node is None:
+            return {}
         if not isinstance(node, MappingNode):
             raise self.complain(node, "expected keys with values")
         found: dict[str, Node] = {}
@@ -104,8 +106,10 @@ class Source:
                 raise self.complain(node, f"{what}: {key[1:]} is missing")
         return found
 
-    def items(self, node: Node) -> list[Node]:
-        """The items of a list. Raises UserError for anything else."""
+    def items(self, node: Node | None) -> list[Node]:
+        """The items of a list; none without one. Raises UserError for anything else."""
+        if node is None:
+            return []
         if not isinstance(node, SequenceNode):
             raise self.complain(node, "expected a list")
         return list(node.value)
@@ -131,7 +135,7 @@ class Source:
     def pose(self, node: Node | None, *, with_base: bool = True) -> tuple[Node | None, Pose]:
         """The `base_frame` of a transform, which may be missing, and its pose in that: m, and degrees. Raises UserError."""
         if node is None:
-            return None, Pose()
+            return None, HERE
         keys = self.keys(node, "pose", ("base_frame",) * with_base + ("translation", "rotation"))
         for value in keys.values():
             if value.tag == "!Uniform" or value.tag.startswith("!Gaussian"):
@@ -139,23 +143,23 @@ class Source:
         x, y, z = self.numbers(keys["translation"], 3) if "translation" in keys else (0.0, 0.0, 0.0)
         if max(abs(x), abs(y), abs(z)) > FARTHEST:
             raise self.complain(node, f"is farther than {FARTHEST:g} m away")
-        turn = self._rotation(keys["rotation"]) if "rotation" in keys else Pose()
-        return keys.get("base_frame"), Pose((x, y, z), turn.quaternion)
+        return keys.get("base_frame"), Pose((x, y, z), self._rotation(keys.get("rotation")).quaternion)
 
-    def _rotation(self, node: Node) -> Pose:
+    def _rotation(self, node: Node | None) -> Pose:
+        if node is None:
+            return HERE
         if node.tag == "!Rpy":
             angles = self.numbers(self.keys(node, "!Rpy", ("*deg",))["deg"], 3)
             return Pose.from_rpy(0.0, 0.0, 0.0, *map(math.radians, angles))
         if node.tag == "!AngleAxis":
             keys = self.keys(node, "!AngleAxis", ("*angle_deg", "*axis"))
-            half, axis = math.radians(self.number(keys["angle_deg"])) / 2, self.numbers(keys["axis"], 3)
+            axis = self.numbers(keys["axis"], 3)
             length = math.hypot(*axis)
             if not 1e-9 < length < 1e9:
                 raise self.complain(node, "the axis has no usable length")
-            x, y, z = (part / length * math.sin(half) for part in axis)
-            return Pose((0.0, 0.0, 0.0), (math.cos(half), x, y, z))
+            return turn(vector(part / length for part in axis), math.radians(self.number(keys["angle_deg"])))
         if node.tag in ("!Identity", "tag:yaml.org,2002:map") and not node.value:
-            return Pose()
+            return HERE
         raise self.complain(node, f"expected a rotation !Rpy or !AngleAxis, found {node.tag[:40]}")
 
 
@@ -281,16 +285,14 @@ def _flat(one: Directive) -> str:
     """A directive on one line, its names as seen from the outermost file."""
     node, source = deepcopy(one.node), one.source
     keys = source.pairs(source.pairs(node)[one.kind])
-    groups = [
-        node for key in ("member_groups", "ignored_collision_filter_groups") if key in keys for node in keys[key].value
-    ]
-    named = [*groups, *(keys["members"].value if "members" in keys else ())]
+    groups = [*source.items(keys.get("member_groups")), *source.items(keys.get("ignored_collision_filter_groups"))]
+    named: list[Any] = [*groups, *source.items(keys.get("members"))]
     named += [keys[key] for key in ("parent", "child") if key in keys]
     # A frame of the world is in no namespace.
     if "name" in keys and (one.kind != "add_frame" or "::" in keys["name"].value):
         named.append(keys["name"])
     poses = [keys["X_PF"]] if "X_PF" in keys else []
-    poses += source.pairs(keys["default_free_body_pose"]).values() if "default_free_body_pose" in keys else ()
+    poses += source.pairs(keys.get("default_free_body_pose")).values()
     named += [base for pose in poses if (base := source.pairs(pose).get("base_frame")) is not None]
     for each in named:
         each.value = source.scoped(each.value)

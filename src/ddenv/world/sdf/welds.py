@@ -6,7 +6,6 @@ welded to one that can move is one body with that, and so a part of it.
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -18,8 +17,8 @@ from yaml.nodes import Node
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.world.model import Joint, Link, Model, Shared, World, held_with
-from ddenv.world.pose import HERE, Pose
-from ddenv.world.sdf.assemble import assemble
+from ddenv.world.pose import HERE, Pose, turn, vector
+from ddenv.world.sdf.assemble import assemble, still
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.directives import WORLD, WORLD_INSTANCE, Directive, Source, Span, opened, spans_of
 from ddenv.world.sdf.frames import Scope
@@ -127,8 +126,7 @@ class _Builder:
         part = replace(part, name=name)
         outer = Scope(_element(WORLD, *at), (source.path,), self.context, self.scopes)
         model = without_mass(assemble(part, name, outer, None, self.context), part.element)
-        positions = source.pairs(keys["default_joint_positions"]) if "default_joint_positions" in keys else {}
-        model, turned = _at_positions(model, positions, source)
+        model, turned = _at_positions(model, source.pairs(keys.get("default_joint_positions")), source)
         self.models[name], self.elements[name] = model, include
         self.spans[name].append(one.span)
         for own, pose, held in _frames(outer.inside(part), outer.placed(part), ""):
@@ -142,8 +140,7 @@ class _Builder:
             while root in parents:
                 root = parents[root]
             self.roots[name, link.name] = root
-        free = source.pairs(keys["default_free_body_pose"]) if "default_free_body_pose" in keys else {}
-        for body, value in free.items():
+        for body, value in source.pairs(keys.get("default_free_body_pose")).items():
             frame = self.frames.get(f"{name}::{body}")
             if frame is None or "::" in body:
                 raise source.complain(value, f"there is no body '{body[:80]}' in '{name[:80]}'")
@@ -244,25 +241,25 @@ class _Builder:
                 continue
             at = fixing.own.link
             joints = _hung_from(at, joints)
+            weld = Joint(f"{at} (weld)", "fixed", WORLD, at, self._pose(base))
             if base.model == name:
-                joints.append(Joint(f"{at} (weld)", "fixed", base.link, at, self._pose(base)))
+                joints.append(replace(weld, parent=base.link))
             elif base.model and not _holds(self.finish(base.model), base.link):
                 if name in self.carriers:
                     raise fixing.complain(f"'{name[:80]}' is welded to two models that can move")
                 outer, parent = base.model, base.link
                 if outer in self.carriers:
                     outer, parent = self.carriers[outer][0], f"{outer}::{parent}"
-                at = f"{name}::{at}"
-                self.carriers[name] = outer, Joint(f"{at} (weld)", "fixed", parent, at, self._pose(base))
+                weld = replace(weld, name=f"{name}::{weld.name}", parent=parent, child=f"{name}::{at}")
+                self.carriers[name] = outer, weld
             else:
-                joints.append(Joint(f"{at} (weld)", "fixed", WORLD, at, self._pose(base)))
+                joints.append(weld)
             self.ties |= dict.fromkeys((name, other) for other in sorted(others))
         links = tuple(_moved_link(link, place[link.name]) for link in model.links)
         pose = place[model.links[0].name] @ model.pose
         model = replace(model, pose=pose, links=links, joints=tuple(joints), spans=tuple(self.spans[name]))
         if name not in self.carriers and not model.static and all(_holds(model, link.name) for link in links):
-            bare = tuple(replace(link, inertia=None) for link in links)
-            return replace(model, static=True, links=bare, joints=(), gravity=True)
+            return still(model)
         return model
 
     def all(self) -> tuple[Model, ...]:
@@ -321,8 +318,8 @@ class _Builder:
                     yield Shared(one.source.bytes_of(span), names)
 
     def _owners(self, one: Directive, key: str, groups: Mapping[str, frozenset[str]]) -> frozenset[str]:
-        nodes = one.source.items(one.keys[key]) if key in one.keys else []
-        return frozenset[str]().union(*(self._owner(node, key, one.source, groups) for node in nodes))
+        owners = (self._owner(node, key, one.source, groups) for node in one.source.items(one.keys.get(key)))
+        return frozenset[str]().union(*owners)
 
     def _owner(self, node: Node, key: str, source: Source, groups: Mapping[str, frozenset[str]]) -> frozenset[str]:
         """The models of a member, which is a body, or of a group. Raises UserError."""
@@ -356,22 +353,18 @@ def parse_directives(text: bytes, path: Path, context: Context) -> World:
         shared.append(Shared(span, frozenset(model.name for model in models), b"\n  []"))
     context.note_unused(_element(WORLD, path))
     ties = ((builder.carrier(name), builder.carrier(other)) for name, other in builder.ties)
-    return World(
+    world = World(
         path=path,
         name=path.name.split(".")[0],
         text=text,
         gravity=GRAVITY,
         models=models,
         version=VERSION,
-        notes=tuple(context.notes),
         anchors=frozenset(map(builder.carrier, builder.anchors)),
-        resources=context.resources.taken,
-        found=tuple(context.resources.found.values()),
-        absent=context.resources.absent(),
-        guessed=tuple(context.guessed),
         ties=tuple(dict.fromkeys((name, other) for name, other in ties if name != other)),
         shared=tuple(shared),
     )
+    return context.recorded(world)
 
 
 def _element(tag: str, path: Path, line: int = 1, span: Span = (0, 0)) -> Element:
@@ -396,7 +389,8 @@ def _frames(scope: Scope, here: Pose, prefix: str) -> Iterator[tuple[str, Pose, 
 def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -> tuple[Model, dict[str, Pose]]:
     """`model` with joints at `positions` (rad, or m), and how far each link moves. Raises UserError."""
     joints = {joint.name: joint for joint in model.joints}
-    turns: dict[str, tuple[float, Pose]] = {}
+    at: dict[str, float] = {}
+    turns: dict[str, Pose] = {}
     for name, node in positions.items():
         joint = joints.get(name)
         if joint is None:
@@ -404,14 +398,13 @@ def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -
             raise source.complain(node, f"there is no joint '{name[:80]}'{near}")
         if joint.kind not in ("revolute", "continuous", "prismatic"):
             raise source.complain(node, f"only joints with one position are read; {joint.kind} is '{name[:80]}'")
-        (at,) = source.numbers(node, 1)
-        x, y, z = joint.axis
+        (position,) = source.numbers(node, 1)
+        at[name] = position
         if joint.kind == "prismatic":
-            turns[joint.child] = at, Pose((x * at, y * at, z * at))
+            turns[joint.child] = Pose(vector(part * position for part in joint.axis))
         else:
-            sine, there = math.sin(at / 2), Pose(joint.pose.position)
-            turn = Pose((0.0, 0.0, 0.0), (math.cos(at / 2), x * sine, y * sine, z * sine))
-            turns[joint.child] = at, there @ turn @ there.inverse()
+            there = Pose(joint.pose.position)
+            turns[joint.child] = there @ turn(joint.axis, position) @ there.inverse()
     if not turns:
         return model, {}
     parents = {joint.child: joint.parent for joint in model.joints}
@@ -419,12 +412,12 @@ def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -
 
     def place(link: str) -> Pose:
         if link not in moved:
-            moved[link] = (place(parents[link]) if link in parents else HERE) @ turns.get(link, (0.0, HERE))[1]
+            moved[link] = (place(parents[link]) if link in parents else HERE) @ turns.get(link, HERE)
         return moved[link]
 
     links = tuple(_moved_link(link, place(link.name)) for link in model.links)
-    new = (_moved_joint(joint, place(joint.child), turns.get(joint.child, (0.0, HERE))[0]) for joint in model.joints)
-    return replace(model, links=links, joints=tuple(new)), moved
+    turned = tuple(_moved_joint(joint, place(joint.child), at.get(joint.name, 0.0)) for joint in model.joints)
+    return replace(model, links=links, joints=turned), moved
 
 
 def _moved_link(link: Link, by: Pose) -> Link:
