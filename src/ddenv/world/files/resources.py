@@ -163,8 +163,8 @@ _TEXTS = {
 
 # The newest supported SDF version: a model's folder may hold one file per version.
 NEWEST_SDF = (1, 12)
-# A line names so many commands.
-MOST_COMMANDS = 3
+# A line names so many commands, and so many folders.
+MOST_COMMANDS = MOST_FOLDERS = 3
 MODEL_CONFIG_LIMIT = 1_000_000  # bytes
 CLIMBS = "leaves its folder with '..' (give the target folder with --model-path)"
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):(.*)", re.DOTALL)
@@ -317,8 +317,7 @@ def _first(candidates: Iterable[Path], where: str) -> Path:
 
 def _listed(folders: Collection[Path]) -> str:
     """The first three folders by name."""
-    names = ", ".join(str(folder)[:100] for folder in list(folders)[:3])
-    return names if len(folders) <= 3 else f"{names} and {len(folders) - 3} more"
+    return first_of([str(folder)[:100] for folder in folders], MOST_FOLDERS)
 
 
 def model_file(folder: Path) -> Path:

@@ -9,6 +9,7 @@ from typing import Literal
 
 from ddenv.errors import UserError
 from ddenv.settings import Ignorable
+from ddenv.text import first_of
 from ddenv.world.access import MissingFiles, Unsupported
 from ddenv.world.files.resources import Resources, how_to_fetch
 from ddenv.world.model import Note, World
@@ -73,6 +74,10 @@ WITHOUT = {
 INSIDE = frozenset(
     ["inertial", "inertia", "surface", "friction", "bounce", "axis", "axis2", "limit", "dynamics", "velocity_decay"]
 )
+
+
+# A message names so many other files.
+MOST_NAMED = 5
 
 
 @dataclass
@@ -158,8 +163,7 @@ class Context:
 
 def _also(what: str, uris: Sequence[str]) -> str:
     """The end of a sentence that names other files."""
-    more = f" and {len(uris) - 5} more" if len(uris) > 5 else ""
-    return f"; {what}: {', '.join(repr(uri[:100]) for uri in uris[:5])}{more}" if uris else ""
+    return f"; {what}: {first_of([repr(uri[:100]) for uri in uris], MOST_NAMED)}" if uris else ""
 
 
 def sdf_root(text: bytes, path: Path) -> Element:
