@@ -240,7 +240,11 @@ class _Scanner:
                 return self.fault(start, f"the tag <{_short(tag)} is not closed by '>'")
             return self.fault(rest.start(), f"expected an attribute or '>' in the tag <{_short(tag)}")
         name = _short(half[1].decode(self.encoding, "replace"))
-        why = "has no closing quote" if half[3] else "has no quotes around its value" if half[2] else "has no value"
+        why = "has no value"
+        if half[3]:
+            why = "has no closing quote"
+        elif half[2]:
+            why = "has no quotes around its value"
         return self.fault(half.start(1), f"attribute '{name}' in <{_short(tag)}> {why}")
 
     def _open(self, tag: str, attributes: dict[str, str], start: int) -> None:

@@ -199,8 +199,6 @@ def _scaled(shape: Shape, scale: Vector, element: Element) -> Shape:
 
 
 def _times(vector: Vector, scale: Vector) -> Vector:
-    if scale == ONE:
-        return vector
     return (vector[0] * scale[0], vector[1] * scale[1], vector[2] * scale[2])
 
 

@@ -81,9 +81,7 @@ def _is_whole(text: str, bits: int) -> bool:
 
 def _is_color(text: str) -> bool:
     words = text.split()
-    if len(words) not in (3, 4) or not all(map(_is_number, words)):
-        return False
-    return all(_in_unit_range(word) for word in words)
+    return len(words) in (3, 4) and all(_is_number(word) and _in_unit_range(word) for word in words)
 
 
 def _in_unit_range(word: str) -> bool:

@@ -123,7 +123,7 @@ def truth(parent: Element, tag: str, default: bool) -> bool:
     child = parent.find(tag)
     if child is None:
         return default
-    word = (child.text or "").strip().lower()
+    word = text_of(child).lower()
     if word not in ("1", "true", "0", "false"):
         raise complain(child, f"expected true or false, found '{word[:60]}'")
     return word in ("1", "true")
