@@ -90,7 +90,7 @@ class Source:
         for key, value in node.value:
             name = self.text_of(key)
             if name in found:
-                raise self.complain(key, f"the key '{name[:80]}' appears twice")
+                raise self.complain(key, f"the key '{name}' appears twice")
             found[name] = value
         return found
 
@@ -99,8 +99,8 @@ class Source:
         found, known = self.pairs(node), [key.lstrip("*") for key in keys]
         for key in found:
             if key not in known:
-                near = nearest(key[:80], known)
-                raise self.complain(node, f"{what}: unknown key '{key[:80]}'{near}; allowed are {', '.join(known)}")
+                hint = f"{nearest(key, known)}; allowed are {', '.join(known)}"
+                raise self.complain(node, f"{what}: unknown key '{key}'{hint}")
         for key in keys:
             if key[0] == "*" and key[1:] not in found:
                 raise self.complain(node, f"{what}: {key[1:]} is missing")
@@ -214,7 +214,7 @@ def _open(source: Source, files: tuple[Path, ...], context: Context, found: list
             raise source.complain(node, f"expected one directive: {', '.join(KEYS)}")
         ((kind, value),) = source.pairs(node).items()
         if kind not in KEYS:
-            raise source.complain(node, f"unknown directive '{kind[:80]}'{nearest(kind[:80], list(KEYS))}")
+            raise source.complain(node, f"unknown directive '{kind}'{nearest(kind, KEYS)}")
         one = Directive(kind, source.keys(value, kind, KEYS[kind]), node, source, source.bytes_of((start, end)))
         if len(found) >= MOST:
             raise source.complain(node, f"more than {MOST} directives")

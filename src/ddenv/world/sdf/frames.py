@@ -91,9 +91,7 @@ class Scope:
             first, _, rest = name.partition("::")
             if rest and isinstance(part := self.named.get(first), Part):
                 return first, self.inside(part).pose(rest, asker), asker
-            # A nearest match among thousands of names would take longer than reading the file.
-            hint = nearest(name[:80], [each[:80] for each in list(self.named)[:500]])
-            raise complain(asker, f"there is no frame '{name[:80]}' here{hint}")
+            raise complain(asker, f"there is no frame '{name}' here{nearest(name, self.named)}")
         if isinstance(thing, Part):
             element, holder, default = thing.pose, thing.at, ""
         else:

@@ -135,7 +135,7 @@ def chosen(numbers: Mapping[str, Number], globs: Iterable[str]) -> list[Number]:
     globs = list(globs)
     for glob in globs:
         if not any(fnmatchcase(name, glob) for name in numbers):
-            near = nearest(glob, list(numbers))
+            near = nearest(glob, numbers)
             raise UserError(f"--number: there is no number '{glob}'{near}; examples: {', '.join(list(numbers)[:3])}")
     return [one for name, one in numbers.items() if not globs or any(fnmatchcase(name, glob) for glob in globs)]
 

@@ -102,11 +102,11 @@ class _Builder:
                 name = source.inner(keys)
                 if name and name not in self.instances:
                     node = keys.get("model_namespace", one.node)
-                    raise source.complain(node, f"there is no model instance '{name[:80]}' for the namespace")
+                    raise source.complain(node, f"there is no model instance '{name}' for the namespace")
 
     def _claim(self, name: str, source: Source, node: Node) -> None:
         if name in self.instances or name == "DefaultModelInstance":
-            raise source.complain(node, f"the model '{name[:80]}' is added twice")
+            raise source.complain(node, f"the model '{name}' is added twice")
         self.instances.add(name)
 
     def _add_model(self, one: Directive) -> None:
@@ -143,7 +143,7 @@ class _Builder:
         for body, value in source.pairs(keys.get("default_free_body_pose")).items():
             frame = self.frames.get(f"{name}::{body}")
             if frame is None or "::" in body:
-                raise source.complain(value, f"there is no body '{body[:80]}' in '{name[:80]}'")
+                raise source.complain(value, f"there is no body '{body}' in '{name}'")
             base, pose = source.pose(value)
             there = Frame() if base is None else self._frame(base, source)
             self._fix(Fixing(frame, there, pose, partial(source.complain, value), weld=False))
@@ -153,10 +153,9 @@ class _Builder:
         name = source.scoped(source.text_of(node))
         found = [each for each in self.frames if name == (each if "::" in name else each.rpartition("::")[2])]
         if not found:
-            near = nearest(name[:80], list(self.frames)[:500])
-            raise source.complain(node, f"there is no frame '{name[:80]}' here{near}")
+            raise source.complain(node, f"there is no frame '{name}' here{nearest(name, self.frames)}")
         if len(found) > 1:
-            raise source.complain(node, f"'{name[:80]}' may be {' or '.join(found[:3])}")
+            raise source.complain(node, f"'{name}' may be {' or '.join(found[:3])}")
         return self.frames[found[0]]
 
     def _add_frame(self, one: Directive) -> None:
@@ -170,7 +169,7 @@ class _Builder:
         if instance:
             instance = source.scoped(instance)
             if instance not in self.instances:
-                raise source.complain(one.keys["name"], f"there is no model instance '{instance[:80]}'")
+                raise source.complain(one.keys["name"], f"there is no model instance '{instance}'")
             words = instance.split("::")
             owners |= {name for end in range(len(words)) if (name := "::".join(words[: end + 1])) in self.models}
         else:
@@ -178,7 +177,7 @@ class _Builder:
             instance = "::".join(each for each in (there.model or WORLD_INSTANCE, inner) if each)
         full = f"{instance}::{last}"
         if full in self.frames:
-            raise source.complain(one.keys["name"], f"there already is a frame '{full[:80]}'")
+            raise source.complain(one.keys["name"], f"there already is a frame '{full}'")
         self.frames[full] = Frame(there.model, there.link, there.pose @ pose, owners)
         for owner in owners:
             self.spans[owner].append(one.span)
@@ -190,11 +189,11 @@ class _Builder:
         if model.static or any(
             joint.parent == WORLD for joint in model.joints if self.roots[name, joint.child] == key[1]
         ):
-            raise fixing.complain(f"'{name[:80]}' is fixed to the world by its own file")
+            raise fixing.complain(f"'{name}' is fixed to the world by its own file")
         if before is not None and (before.weld or not fixing.weld or before.base.model):
-            raise fixing.complain(f"'{name[:80]}' is placed twice")
+            raise fixing.complain(f"'{name}' is placed twice")
         if not (fixing.weld or fixing.base.model or link == key[1]):
-            raise fixing.complain(f"'{link[:80]}' is not free: joints hold it")
+            raise fixing.complain(f"'{link}' is not free: joints hold it")
         self.fixings[key] = fixing
 
     # Where all of it is.
@@ -209,7 +208,7 @@ class _Builder:
             self.places[key] = self._pose(fixing.base) @ fixing.pose @ fixing.own.pose.inverse()
         place = self.places[key]
         if place is None:
-            raise fixing.complain(f"the place of '{key[0][:80]}' depends on itself")
+            raise fixing.complain(f"the place of '{key[0]}' depends on itself")
         return place
 
     def _pose(self, frame: Frame) -> Pose:
@@ -246,7 +245,7 @@ class _Builder:
                 joints.append(replace(weld, parent=base.link))
             elif base.model and not _holds(self.finish(base.model), base.link):
                 if name in self.carriers:
-                    raise fixing.complain(f"'{name[:80]}' is welded to two models that can move")
+                    raise fixing.complain(f"'{name}' is welded to two models that can move")
                 outer, parent = base.model, base.link
                 if outer in self.carriers:
                     outer, parent = self.carriers[outer][0], f"{outer}::{parent}"
@@ -297,7 +296,7 @@ class _Builder:
         for one in self.filters:
             name = one.source.scoped(one.source.text_of(one.keys["name"]))
             if name in groups:
-                raise one.source.complain(one.node, f"the group '{name[:80]}' is added twice")
+                raise one.source.complain(one.node, f"the group '{name}' is added twice")
             groups[name] = one
         owners = {name: self._owners(one, "members", {}) for name, one in groups.items()}
         before: dict[str, frozenset[str]] = {}
@@ -327,7 +326,7 @@ class _Builder:
             return frozenset(map(self.carrier, self._frame(node, source).owners))
         name = source.scoped(source.text_of(node))
         if name not in groups:
-            raise source.complain(node, f"there is no group '{name[:80]}'{nearest(name[:80], list(groups)[:500])}")
+            raise source.complain(node, f"there is no group '{name}'{nearest(name, groups)}")
         return groups[name]
 
 
@@ -394,10 +393,9 @@ def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -
     for name, node in positions.items():
         joint = joints.get(name)
         if joint is None:
-            near = nearest(name[:80], list(joints)[:500])
-            raise source.complain(node, f"there is no joint '{name[:80]}'{near}")
+            raise source.complain(node, f"there is no joint '{name}'{nearest(name, joints)}")
         if joint.kind not in ("revolute", "continuous", "prismatic"):
-            raise source.complain(node, f"only joints with one position are read; {joint.kind} is '{name[:80]}'")
+            raise source.complain(node, f"only joints with one position are read; {joint.kind} is '{name}'")
         (position,) = source.numbers(node, 1)
         at[name] = position
         if joint.kind == "prismatic":
