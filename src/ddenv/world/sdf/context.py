@@ -176,7 +176,7 @@ def sdf_root(text: bytes, path: Path) -> Element:
         raise complain(root, f"is a robot in URDF, and no world; {how_to_include(path)}")
     if root.tag != "sdf":
         raise complain(root, "expected <sdf> as the outermost element: is this an SDF file?")
-    given = (root.get("version") or "").strip()
+    given = root.get("version", "").strip()
     if given not in VERSIONS:
         said = f"version '{given[:20]}' is not supported" if given else "has no version attribute"
         raise complain(root, f"{said}; use SDF {VERSIONS[0]} to {VERSIONS[-1]}")

@@ -54,7 +54,7 @@ def _given(
         context.note("replaced", link, f"no <inertial>: {DEFAULT_MASS:g} kg, spread evenly over its shapes")
         return spread(collisions, density, link_pose, DEFAULT_MASS)
     mass = number_or_nan(element, "mass", DEFAULT_MASS)
-    if (element.get("auto") or "").strip().lower() in ("1", "true"):
+    if element.get("auto", "").strip().lower() in ("1", "true"):
         given = element.find("mass") is not None and LIGHTEST <= mass <= HEAVIEST
         return spread(collisions, density, link_pose, mass if given else None)
     if not LIGHTEST <= mass <= HEAVIEST:

@@ -204,7 +204,7 @@ def read_color(visual: Element) -> Color | None:
     for tag in ("material/diffuse", "material/ambient"):
         element = visual.find(tag)
         if element is not None and text_of(element):
-            count = 4 if len((element.text or "").split()) == 4 else 3
+            count = 4 if len(text_of(element).split()) == 4 else 3
             red, green, blue, *alpha = (min(max(value, 0.0), 1.0) for value in numbers(element, count))
             # Many files have colours with an alpha of zero, which the simulators that wrote them ignored.
             return red, green, blue, ((alpha or [1.0])[0] or 1.0) * opacity

@@ -96,10 +96,10 @@ class _Checker:
 
     def _frame(self, frame: Element, holder: Element) -> Iterator[Refusal]:
         pose = frame.find("pose")
-        to = frame.get("attached_to") or ""
+        to = frame.get("attached_to", "")
         if to and (to == frame.get("name") or not self._holds(holder, to)):
             yield "a <frame> that is attached to nothing", frame
-        relative_to = "" if pose is None else pose.get("relative_to") or ""
+        relative_to = "" if pose is None else pose.get("relative_to", "")
         if relative_to and not self._holds(holder, relative_to):
             yield "a <frame> whose pose is relative to nothing", frame
 

@@ -171,7 +171,7 @@ def _end(joint: Element, tag: str, links: Collection[str]) -> str:
 
 def joint_of(source: Element, parent: str, child: str) -> Element:
     """The SDF joint for a URDF one. Raises UserError."""
-    kind = (source.get("type") or "").strip()
+    kind = source.get("type", "").strip()
     if kind not in KINDS:
         raise complain(source, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
     ends = element("parent", source, parent), element("child", source, child)

@@ -99,7 +99,7 @@ def numbers(element: Element, count: int) -> tuple[float, ...]:
     """The text of `element` as `count` finite numbers. Raises UserError."""
     values = floats(element)
     if len(values) != count or not all(map(math.isfinite, values)):
-        shown = " ".join((element.text or "").split())[:60]
+        shown = " ".join(text_of(element).split())[:60]
         wanted = "one finite number" if count == 1 else f"{count} finite numbers"
         raise complain(element, f"expected {wanted}, found '{shown}'")
     return values
