@@ -62,10 +62,14 @@ class Source:
         """`name` with the namespace before it; `world` has none."""
         return name if name == WORLD or not self.namespace else f"{self.namespace}::{name}"
 
+    def name_of(self, node: Node) -> str:
+        """The name in a scalar, with the namespace before it. Raises UserError."""
+        return self.scoped(self.text_of(node))
+
     def inner(self, keys: Mapping[str, Node]) -> str:
         """The namespace that `model_namespace` of a directive says. Raises UserError."""
         own = keys.get("model_namespace")
-        return self.namespace if own is None else self.scoped(self.text_of(own))
+        return self.namespace if own is None else self.name_of(own)
 
     def bytes_of(self, span: Span) -> Span:
         """Byte positions in the encoded text for positions in the text."""

@@ -67,7 +67,8 @@ class _Builder:
     scopes: dict[int, Scope] = field(default_factory=dict)
     frames: dict[str, Frame] = field(default_factory=lambda: {f"{WORLD_INSTANCE}::{WORLD}": Frame()})
     instances: set[str] = field(default_factory=lambda: {WORLD_INSTANCE})
-    roots: dict[Group, str] = field(default_factory=dict)
+    # By model and link.
+    groups: dict[tuple[str, str], Group] = field(default_factory=dict)
     fixings: dict[Group, Fixing] = field(default_factory=dict)
     spans: dict[str, list[Span]] = field(default_factory=lambda: defaultdict(list))
     filters: list[Directive] = field(default_factory=list)
@@ -85,7 +86,7 @@ class _Builder:
             case "add_model":
                 self._add_model(one)
             case "add_model_instance":
-                self._claim(source.scoped(source.text_of(keys["name"])), source, keys["name"])
+                self._new_model(one)
             case "add_frame":
                 self._add_frame(one)
             case "add_weld":
@@ -104,15 +105,18 @@ class _Builder:
                     node = keys.get("model_namespace", one.node)
                     raise source.complain(node, f"there is no model instance '{name}' for the namespace")
 
-    def _claim(self, name: str, source: Source, node: Node) -> None:
+    def _new_model(self, one: Directive) -> str:
+        """The name of the model that `one` adds. Raises UserError if it is taken."""
+        node = one.keys["name"]
+        name = one.source.name_of(node)
         if name in self.instances or name == "DefaultModelInstance":
-            raise source.complain(node, f"the model '{name}' is added twice")
+            raise one.source.complain(node, f"the model '{name}' is added twice")
         self.instances.add(name)
+        return name
 
     def _add_model(self, one: Directive) -> None:
         source, keys = one.source, one.keys
-        name = source.scoped(source.text_of(keys["name"]))
-        self._claim(name, source, keys["name"])
+        name = self._new_model(one)
         at = source.path, int(one.node.start_mark.line) + 1, one.span
         include, uri = _element("add_model", *at), _element("uri", *at)
         uri.text = source.text_of(keys["file"])
@@ -127,7 +131,8 @@ class _Builder:
         outer = Scope(_element(WORLD, *at), (source.path,), self.context, self.scopes)
         model = without_mass(assemble(part, name, outer, None, self.context), part.element)
         model, turned = _at_positions(model, source.pairs(keys.get("default_joint_positions")), source)
-        self.models[name], self.elements[name] = model, include
+        self.models[name] = model
+        self.elements[name] = include
         self.spans[name].append(one.span)
         for own, pose, held in _frames(outer.inside(part), outer.placed(part), ""):
             if own != OWN_FRAME or not is_urdf(part.element):
@@ -139,7 +144,7 @@ class _Builder:
             root = link.name
             while root in parents:
                 root = parents[root]
-            self.roots[name, link.name] = root
+            self.groups[name, link.name] = name, root
         for body, value in source.pairs(keys.get("default_free_body_pose")).items():
             frame = self.frames.get(f"{name}::{body}")
             if frame is None or "::" in body:
@@ -150,7 +155,7 @@ class _Builder:
 
     def _frame(self, node: Node, source: Source) -> Frame:
         """The frame that `node` names. Raises UserError."""
-        name = source.scoped(source.text_of(node))
+        name = source.name_of(node)
         found = [each for each in self.frames if name == (each if "::" in name else each.rpartition("::")[2])]
         if not found:
             raise source.complain(node, f"there is no frame '{name}' here{nearest(name, self.frames)}")
@@ -184,38 +189,37 @@ class _Builder:
 
     def _fix(self, fixing: Fixing) -> None:
         name, link = fixing.own.model, fixing.own.link
-        key, model = (name, self.roots[name, link]), self.models[name]
-        before = self.fixings.get(key)
-        if model.static or any(
-            joint.parent == WORLD for joint in model.joints if self.roots[name, joint.child] == key[1]
-        ):
+        group, model = self.groups[name, link], self.models[name]
+        before = self.fixings.get(group)
+        held = {self.groups[name, joint.child] for joint in model.joints if joint.parent == WORLD}
+        if model.static or group in held:
             raise fixing.complain(f"'{name}' is fixed to the world by its own file")
         if before is not None and (before.weld or not fixing.weld or before.base.model):
             raise fixing.complain(f"'{name}' is placed twice")
-        if not (fixing.weld or fixing.base.model or link == key[1]):
+        if not (fixing.weld or fixing.base.model or link == group[1]):
             raise fixing.complain(f"'{link}' is not free: joints hold it")
-        self.fixings[key] = fixing
+        self.fixings[group] = fixing
 
     # Where all of it is.
 
-    def _place(self, key: Group) -> Pose:
+    def _place(self, group: Group) -> Pose:
         """How far a group of links moves from the place where its own file puts it. Raises UserError."""
-        fixing = self.fixings.get(key)
+        fixing = self.fixings.get(group)
         if fixing is None:
             return HERE
-        if key not in self.places:
-            self.places[key] = None
-            self.places[key] = self._pose(fixing.base) @ fixing.pose @ fixing.own.pose.inverse()
-        place = self.places[key]
+        if group not in self.places:
+            self.places[group] = None
+            self.places[group] = self._pose(fixing.base) @ fixing.pose @ fixing.own.pose.inverse()
+        place = self.places[group]
         if place is None:
-            raise fixing.complain(f"the place of '{key[0]}' depends on itself")
+            raise fixing.complain(f"the place of '{group[0]}' depends on itself")
         return place
 
     def _pose(self, frame: Frame) -> Pose:
         """The pose of `frame` in the world."""
         if not frame.model:
             return frame.pose
-        return self._place((frame.model, self.roots[frame.model, frame.link])) @ frame.pose
+        return self._place(self.groups[frame.model, frame.link]) @ frame.pose
 
     def finish(self, name: str) -> Model:
         """The model `name` at its place, with its welds to what does not move. Raises UserError."""
@@ -229,9 +233,9 @@ class _Builder:
 
     def _finished(self, name: str) -> Model:
         model = self.models[name]
-        place = {link.name: self._place((name, self.roots[name, link.name])) for link in model.links}
+        place = {link.name: self._place(self.groups[name, link.name]) for link in model.links}
         joints = [_moved_joint(joint, place[joint.child]) for joint in model.joints]
-        groups = dict.fromkeys((name, self.roots[name, link.name]) for link in model.links)
+        groups = dict.fromkeys(self.groups[name, link.name] for link in model.links)
         for fixing in (self.fixings[group] for group in groups if group in self.fixings):
             base = fixing.base
             others = (fixing.own.owners | base.owners) - {name}
@@ -294,7 +298,7 @@ class _Builder:
         """What of collision filter groups goes when all of some models are gone. Raises UserError."""
         groups: dict[str, Directive] = {}
         for one in self.filters:
-            name = one.source.scoped(one.source.text_of(one.keys["name"]))
+            name = one.source.name_of(one.keys["name"])
             if name in groups:
                 raise one.source.complain(one.node, f"the group '{name}' is added twice")
             groups[name] = one
@@ -324,7 +328,7 @@ class _Builder:
         """The models of a member, which is a body, or of a group. Raises UserError."""
         if key == "members":
             return frozenset(map(self.carrier, self._frame(node, source).owners))
-        name = source.scoped(source.text_of(node))
+        name = source.name_of(node)
         if name not in groups:
             raise source.complain(node, f"there is no group '{name}'{nearest(name, groups)}")
         return groups[name]
