@@ -189,7 +189,7 @@ def note_inside(world: World) -> Iterator[tuple[str, str]]:
 
 def note_unseen(world: World, among: Collection[str]) -> Iterator[tuple[str, str]]:
     """What `among` these models the robot may hit where nothing is seen. A world without any visual is not made to be looked at."""
-    if not any(link.visuals for model in world.models for link in model.links):
+    if not any(model.visuals for model in world.models):
         return
     # A visual that was not read may be there.
     unread = {note.model for note in world.notes if note.kind == "ignored"}
@@ -199,8 +199,7 @@ def note_unseen(world: World, among: Collection[str]) -> Iterator[tuple[str, str
         hit = model_bounds(model)
         if hit is None or model.name not in among or model.name in unread:
             continue
-        visuals = (visual for link in model.links for visual in link.visuals)
-        seen = around(shape_bounds(visual.shape, visual.pose) for visual in visuals)
+        seen = around(shape_bounds(visual.shape, visual.pose) for visual in model.visuals)
         if seen is None:
             unseen.append(model.name)
         elif ((hit[1] - hit[0])[:2] > LARGER * np.maximum(seen[1] - seen[0], THIN)[:2]).any():
@@ -216,9 +215,9 @@ def note_unseen(world: World, among: Collection[str]) -> Iterator[tuple[str, str
 
 def inside(world: World) -> list[Inside]:
     """Models of which one can move, and one starts deeper than `INSIDE` in the other."""
-    shapes = [(model, one) for model in world.models for one in model.collisions]
+    shapes, boxes = _shapes(world)
     deepest: dict[tuple[str, str], float] = {}
-    for first, second in islice(_near(shapes), MOST_PAIRS):
+    for first, second in islice(_near(shapes, boxes), MOST_PAIRS):
         (model, shape), (other, obstacle) = shapes[first], shapes[second]
         # What cannot move, or has no end, is the obstacle.
         if model.static or isinstance(shape.shape, Plane):
@@ -230,9 +229,9 @@ def inside(world: World) -> list[Inside]:
     return [Inside(*pair, depth) for pair, depth in deepest.items()]
 
 
-def _near(shapes: Sequence[tuple[Model, Collision]]) -> Iterator[tuple[int, int]]:
-    """The shapes of two models that may overlap, one of which can move: by the boxes around them, swept along x."""
-    low, high = stacked(filled_bounds(one) for _, one in shapes)
+def _near(shapes: Sequence[tuple[Model, Collision]], boxes: Bounds) -> Iterator[tuple[int, int]]:
+    """The shapes of two models that may overlap, one of which can move: by the `boxes` around them, swept along x."""
+    low, high = boxes
     free = np.array([not model.static for model, _ in shapes], dtype=bool)
     names = {id(model): number for number, (model, _) in enumerate(shapes)}
     owners = np.array([names[id(model)] for model, _ in shapes], dtype=int)
@@ -261,7 +260,7 @@ def drop(world: World, robot: Model, spawn: Spawn) -> float:
     place = spawn_pose(spawn) @ robot.pose.inverse()
     boxes = [shape_bounds(one.shape, place @ one.pose) for one in robot.collisions if not isinstance(one.shape, Plane)]
     heights = []
-    for collision in (one for model in world.models for one in model.collisions):
+    for collision in world.collisions:
         low, high = shape_bounds(collision.shape, collision.pose)
         endless = isinstance(collision.shape, Plane)
         below = (bottom for bottom, top in boxes if endless or ((bottom < high)[:2].all() and (low < top)[:2].all()))
