@@ -131,7 +131,7 @@ class _Builder:
         there = saved.links.get(own, spot.actual @ local)
         self.poses[name] = LinkPose(spot.nominal @ local, there)
         self.elements.append(element)
-        self.links.append(read_link(element, spot, self.context, there, local, moving=not spot.static))
+        self.links.append(read_link(element, spot, self.context, there, local))
 
     def _add_part(self, part: Part, spot: Spot, outer: Saved) -> None:
         local = spot.scope.placed(part)

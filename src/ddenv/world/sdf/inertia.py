@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -29,10 +30,11 @@ def read_inertia(
     link: Element, link_pose: Pose, collisions: Sequence[Collision], density: Sequence[float], context: Context
 ) -> Inertia:
     """The inertia of a moving link at `link_pose`, in the world frame; `density` (kg/m^3) has one entry per collision."""
-    inertia = _given(link, link_pose, collisions, density, context)
+    evenly = partial(spread, collisions, density, link_pose)
+    inertia = _given(link, link_pose, evenly, context)
     if all(isinstance(one.shape, Plane) for one in collisions):
         return inertia
-    least = spread(collisions, density, link_pose, LIGHTEST_IN_CONTACT)
+    least = evenly(LIGHTEST_IN_CONTACT)
     solid_enough = f"contacts need at least those of {LIGHTEST_IN_CONTACT:g} kg, spread evenly over its shapes"
     if inertia.mass < least.mass:
         context.note("replaced", link, f"too light, {inertia.mass:.3g} kg: mass and inertia; {solid_enough}")
@@ -45,20 +47,18 @@ def read_inertia(
     return replace(inertia, moments=vector(moment + needed for moment in inertia.moments))
 
 
-def _given(
-    link: Element, link_pose: Pose, collisions: Sequence[Collision], density: Sequence[float], context: Context
-) -> Inertia:
-    """The inertia that the file gives, or where it gives none or an impossible one, that of its shapes."""
+def _given(link: Element, link_pose: Pose, evenly: Callable[[float | None], Inertia], context: Context) -> Inertia:
+    """The inertia that the file gives, or where it gives none or an impossible one, that of its shapes: `evenly` spreads a mass."""
     element = link.find("inertial")
     if element is None:
         context.note("replaced", link, f"no <inertial>: {DEFAULT_MASS:g} kg, spread evenly over its shapes")
-        return spread(collisions, density, link_pose, DEFAULT_MASS)
+        return evenly(DEFAULT_MASS)
     mass = number_or_nan(element, "mass", DEFAULT_MASS)
     if element.get("auto", "").strip().lower() in ("1", "true"):
         given = element.find("mass") is not None and LIGHTEST <= mass <= HEAVIEST
-        return spread(collisions, density, link_pose, mass if given else None)
+        return evenly(mass if given else None)
     if not LIGHTEST <= mass <= HEAVIEST:
-        computed = spread(collisions, density, link_pose, None)
+        computed = evenly(None)
         why = f"{computed.mass:.3g} kg, from its shapes and a density of {WATER:g} kg/m^3"
         context.note("replaced", element, f"mass {mass:g} kg is impossible: {why}")
         return computed
@@ -76,7 +76,7 @@ def _given(
         words = (text_of(tensor.find(tag))[:12] or "1" for tag in ("ixx", "iyy", "izz"))
         said = f"moments {' '.join(words)} kg m^2 are impossible"
     context.note("replaced", element, f"{said}: computed from its shapes and its mass of {mass:g} kg")
-    return spread(collisions, density, link_pose, mass)
+    return evenly(mass)
 
 
 def moments_of(inertia: Element) -> tuple[Vector, Vector]:

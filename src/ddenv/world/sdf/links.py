@@ -54,7 +54,7 @@ GAZEBO_COLORS: dict[str, tuple[float, float, float]] = {
 }
 
 
-def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local: Pose, *, moving: bool) -> Link:
+def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local: Pose) -> Link:
     """The link of `element` in the model at `spot`, with its `pose` in the world, and `local` in its model. Raises UserError."""
     note_unread(element, context)
     items = []
@@ -76,9 +76,9 @@ def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local:
                 place = pose @ item.pose @ placed.offset
                 collisions.append(Collision(name_of(item.element), placed.shape, place, mu))
                 density.append(read_density(item.element, usual))
-    inertia = read_inertia(element, pose, collisions, density, context) if moving else None
+    inertia = None if spot.static else read_inertia(element, pose, collisions, density, context)
     kinematic = element.find("kinematic")
-    if kinematic is not None and moving and truth(element, "kinematic", False):
+    if kinematic is not None and not spot.static and truth(element, "kinematic", False):
         context.note("ignored", kinematic, "forces move it like any other link")
     for item in items:
         if isinstance(item.shape, Lost) and item.element.tag == "visual":
