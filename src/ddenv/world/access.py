@@ -89,8 +89,7 @@ def xml_root(data: bytes) -> Element:
     try:
         return parse_xml(data, Path())
     except NotXml as error:
-        where = f"line {error.line}, column {error.column}: " if error.line else ""
-        raise Unusable(f"{where}{error}") from None
+        raise Unusable(str(error)) from None
 
 
 def size_of(path: Path) -> int:

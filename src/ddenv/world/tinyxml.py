@@ -33,10 +33,14 @@ _NO_DOCTYPE = "DOCTYPE is not allowed (its entities can read other files and exh
 
 
 class NotXml(Exception):
-    """Text that cannot be read. The message says why; `line` and `column`, counted from 1, say where; 0 is the whole file."""
+    """Text that cannot be read: `why`, and at which `line` and `column`, counted from 1; all is in the message.
+
+    Of a fault of the whole file, line and column are 0.
+    """
 
     def __init__(self, why: str, line: int = 0, column: int = 0) -> None:
-        super().__init__(why)
+        super().__init__(f"line {line}, column {column}: {why}" if line else why)
+        self.why = why
         self.line = line
         self.column = column
 

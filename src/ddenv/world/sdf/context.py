@@ -114,7 +114,7 @@ class Context:
         if fault is None:
             return
         file = "/".join(root.source.parts[-2:])
-        why = f"in {file}, line {fault.line}, column {fault.column}: {fault}; the file was read as Gazebo reads it"
+        why = f"in {file}, {fault}; the file was read as Gazebo reads it"
         self.notes.append(Note("ignored", self.model, place(root), "a fault of XML", why))
 
     def note_unused(self, root: Element) -> None:

@@ -24,7 +24,7 @@ def parse(text: bytes, path: Path, root: str = "") -> Element:
         return parse_xml(text, path, root)
     except NotXml as error:
         where = f"{path}:{error.line}:{error.column}" if error.line else str(path)
-        raise UserError(f"{where}: {error}") from None
+        raise UserError(f"{where}: {error.why}") from None
 
 
 def tag_end(text: bytes, element: Element) -> int:
