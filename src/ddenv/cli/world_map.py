@@ -57,7 +57,9 @@ def terminal_map(
         if each.model.name in dim:
             continue
         x, y, _ = each.center
-        size = " x ".join(f"{part:.2f}" for part in each.size) if each.outline.polygons else "no shapes"
+        size = "no shapes"
+        if each.outline.polygons:
+            size = " x ".join(f"{part:.2f}" for part in each.size)
         entries.append((sign, each.model.name, f"{x:.2f}, {y:.2f}", size))
     legend = _legend(entries, columns, max(3, rows // 3))
     view = _view(low, high, columns - AXIS, rows - AROUND - len(legend))

@@ -118,7 +118,7 @@ def not_yaml(where: object, error: Exception) -> UserError:
 
 def is_folder(path: Path) -> bool:
     """Whether `path` is an accessible folder; a name that no file can have is none."""
-    return os.path.isdir(path)  # noqa: PTH112  # unlike `Path.is_dir`, it raises nothing
+    return os.path.isdir(path)  # noqa: PTH112  # `Path.is_dir` may raise
 
 
 def folders_of(folder: Path) -> list[str]:
@@ -132,12 +132,12 @@ def folders_of(folder: Path) -> list[str]:
 
 def is_file(path: Path) -> bool:
     """Whether `path` is an accessible file. Any text is taken for a path: one that is too long, or holds a NUL byte, is none."""
-    return os.path.isfile(path)  # noqa: PTH113  # unlike `Path.is_file`, it raises nothing
+    return os.path.isfile(path)  # noqa: PTH113  # `Path.is_file` may raise
 
 
 def without_tilde(name: str) -> Path:
     """`name` with a leading `~` expanded, if the home folder is known."""
-    return Path(os.path.expanduser(name))  # noqa: PTH111  # unlike `Path.expanduser`, it raises nothing
+    return Path(os.path.expanduser(name))  # noqa: PTH111  # `Path.expanduser` may raise
 
 
 def reason(error: OSError) -> str:

@@ -230,7 +230,10 @@ def inside(world: World) -> list[Inside]:
 
 
 def _near(shapes: Sequence[tuple[Model, Collision]], boxes: Bounds) -> Iterator[tuple[int, int]]:
-    """The shapes of two models that may overlap, one of which can move: by the `boxes` around them, swept along x."""
+    """The shapes of two models that may overlap, one of which can move.
+
+    By the `boxes` around them, swept along x.
+    """
     low, high = boxes
     free = np.array([not model.static for model, _ in shapes], dtype=bool)
     names = {id(model): number for number, (model, _) in enumerate(shapes)}

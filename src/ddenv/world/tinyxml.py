@@ -33,9 +33,9 @@ _NO_DOCTYPE = "DOCTYPE is not allowed (its entities can read other files and exh
 
 
 class NotXml(Exception):
-    """Text that cannot be read: `why`, and at which `line` and `column`, counted from 1; all is in the message.
+    """Text that cannot be read: `why`, and at which `line` and `column`, counted from 1.
 
-    Of a fault of the whole file, line and column are 0.
+    The message has all of this. Of a fault of the whole file, line and column are 0.
     """
 
     def __init__(self, why: str, line: int = 0, column: int = 0) -> None:
@@ -242,7 +242,8 @@ class _Scanner:
             rest = _VISIBLE.search(self.text, self.at)
             if rest is None:
                 return self.fault(start, f"the tag <{_short(tag)} is not closed by '>'")
-            return self.fault(rest.start(), f"expected an attribute or '>' in the tag <{_short(tag)}")
+            why = f"expected an attribute or '>' in the tag <{_short(tag)}"
+            return self.fault(rest.start(), why)
         name = _short(half[1].decode(self.encoding, "replace"))
         why = "has no value"
         if half[3]:

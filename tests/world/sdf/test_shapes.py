@@ -43,7 +43,8 @@ SDFORMAT = Path("/usr/share/sdformat12/1.9")
 
 @pytest.mark.skipif(not SDFORMAT.is_dir(), reason="libsdformat's descriptions are not on this machine")
 @pytest.mark.parametrize(
-    ("shape", "child"), [(shape, child) for shape in DEFAULT_SIZES for child in DEFAULT_SIZES[shape]]
+    ("shape", "child"),
+    [(shape, child) for shape, children in DEFAULT_SIZES.items() for child in children],
 )
 def test_sizes_that_a_file_leaves_out_are_those_of_libsdformat(shape, child):
     file = SDFORMAT / f"{shape}_shape.sdf"

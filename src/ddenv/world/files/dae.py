@@ -32,7 +32,8 @@ MOST_WEIGHT = 400_000_000
 def read_dae(data: bytes) -> list[Part]:
     """Every instance of every geometry in the scene, in m, named by its node, its geometry and their ids.
 
-    Dangling references are skipped, as in Gazebo. Raises NotXml and ValueError, and RecursionError if a node contains itself.
+    Dangling references are skipped, as in Gazebo. Raises NotXml and ValueError, and RecursionError
+    if a node contains itself.
     """
     root = parse_xml(data, Path())
     if root.tag != "COLLADA":

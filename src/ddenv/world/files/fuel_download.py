@@ -163,8 +163,9 @@ def _unpack(file: Path, folder: Path) -> None:
 
 def _leads_out(entry: zipfile.ZipInfo) -> bool:
     """Whether a file of a zip file is a link, or would be outside of its folder."""
+    name = entry.filename
     is_link = stat.S_ISLNK(entry.external_attr >> 16)
-    return is_link or entry.filename.startswith("/") or ".." in entry.filename.split("/") or "\\" in entry.filename
+    return is_link or name.startswith("/") or ".." in name.split("/") or "\\" in name
 
 
 def _reason(error: OSError | HTTPException) -> str:

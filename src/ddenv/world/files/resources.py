@@ -68,7 +68,10 @@ class Resources:
         way: list[Any] = [submesh, center, convex]
         key = json.dumps(["mesh", uri, str(base), *way])
         if key not in self._meshes:
-            packed = self._bytes(key, lambda: build(self._parts(self._find(uri, base, model=False)), *way))
+            packed = self._bytes(
+                key,
+                lambda: build(self._parts(self._find(uri, base, model=False)), *way),
+            )
             self._meshes[key] = unpack(json.dumps([uri, *way]), packed)
         return self._meshes[key]
 

@@ -25,7 +25,10 @@ MOST_MODELS = 50_000
 
 @dataclass(frozen=True)
 class Saved:
-    """The entry of one model in `<state>`, or nothing, for the model `element`; poses are in the world frame."""
+    """The entry of one model in `<state>`; empty for the `element` of a model without one.
+
+    Poses are in the world frame.
+    """
 
     element: Element
     pose: Pose | None = None
@@ -115,7 +118,8 @@ class _Builder:
             self._add_part(part, spot, saved)
         if not spot.static:
             self.joints += read_joints(spot, self.poses, self.context)
-        known = {name_of(link) for link in scope.element.findall("link")} | {part.name for part in scope.parts}
+        known = {name_of(link) for link in scope.element.findall("link")}
+        known |= {part.name for part in scope.parts}
         for name in (*saved.links, *saved.models):
             if name not in known:
                 self.context.note("ignored", saved.element, f"the model has no '{name[:80]}'")

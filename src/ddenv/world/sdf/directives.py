@@ -85,7 +85,10 @@ class Source:
         return str(node.value)
 
     def pairs(self, node: Node | None) -> dict[str, Node]:
-        """The values of a mapping by key; none without one. Raises UserError for anything else, and for a key that stands twice."""
+        """The values of a mapping by key; none without one.
+
+        Raises UserError for anything else, and for a key that stands twice.
+        """
         if node is None:
             return {}
         if not isinstance(node, MappingNode):
@@ -147,7 +150,8 @@ class Source:
         x, y, z = self.numbers(keys["translation"], 3) if "translation" in keys else (0.0, 0.0, 0.0)
         if max(abs(x), abs(y), abs(z)) > FARTHEST:
             raise self.complain(node, f"is farther than {FARTHEST:g} m away")
-        return keys.get("base_frame"), Pose((x, y, z), self._rotation(keys.get("rotation")).quaternion)
+        rotation = self._rotation(keys.get("rotation"))
+        return keys.get("base_frame"), Pose((x, y, z), rotation.quaternion)
 
     def _rotation(self, node: Node | None) -> Pose:
         if node is None:
@@ -161,7 +165,8 @@ class Source:
             length = math.hypot(*axis)
             if not 1e-9 < length < 1e9:
                 raise self.complain(node, "the axis has no usable length")
-            return turn(vector(part / length for part in axis), math.radians(self.number(keys["angle_deg"])))
+            angle = math.radians(self.number(keys["angle_deg"]))
+            return turn(vector(part / length for part in axis), angle)
         if node.tag in ("!Identity", "tag:yaml.org,2002:map") and not node.value:
             return HERE
         raise self.complain(node, f"expected a rotation !Rpy or !AngleAxis, found {node.tag[:40]}")
@@ -289,7 +294,8 @@ def _flat(one: Directive) -> str:
     """A directive on one line, its names as seen from the outermost file."""
     node, source = deepcopy(one.node), one.source
     keys = source.pairs(source.pairs(node)[one.kind])
-    groups = [*source.items(keys.get("member_groups")), *source.items(keys.get("ignored_collision_filter_groups"))]
+    groups = source.items(keys.get("member_groups"))
+    groups += source.items(keys.get("ignored_collision_filter_groups"))
     named: list[Any] = [*groups, *source.items(keys.get("members"))]
     named += [keys[key] for key in ("parent", "child") if key in keys]
     # A frame of the world is in no namespace.

@@ -23,7 +23,8 @@ from ddenv.world.write import primitive
 SIDES = 32  # of a cone
 SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline")
 SMALLEST, LARGEST = 1e-6, 1e6  # m
-# The sizes of each shape, m, by the elements that say them; libsdformat takes these where an element is missing.
+# The sizes of each shape, m, by the elements that say them: libsdformat takes these where one is
+# missing.
 DEFAULT_SIZES: dict[str, dict[str, tuple[float, ...]]] = {
     "box": {"size": ONE},
     "capsule": {"radius": (0.5,), "length": (1.0,)},
@@ -99,7 +100,8 @@ def _primitive(element: Element) -> Shape:
         "sphere": Sphere,
     }
     if element.tag not in kinds:
-        raise complain(element, f"<{element.tag}> is not a known shape; use one of {', '.join(SHAPES)}")
+        known = ", ".join(SHAPES)
+        raise complain(element, f"<{element.tag}> is not a known shape; use one of {known}")
     return kinds[element.tag](*_sizes(element))
 
 
@@ -200,7 +202,7 @@ def _times(vector: Vector, scale: Vector) -> Vector:
 
 
 def _sizes(shape: Element) -> list[Any]:
-    """The sizes of a shape, m, in the order of DEFAULT_SIZES: numbers, or vectors. Raises UserError."""
+    """The sizes of a shape, m, as in DEFAULT_SIZES: numbers, or vectors. Raises UserError."""
     sizes: list[Any] = []
     for tag, usual in DEFAULT_SIZES[shape.tag].items():
         element = shape.find(tag)

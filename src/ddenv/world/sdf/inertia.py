@@ -47,8 +47,16 @@ def read_inertia(
     return replace(inertia, moments=vector(moment + needed for moment in inertia.moments))
 
 
-def _given(link: Element, link_pose: Pose, evenly: Callable[[float | None], Inertia], context: Context) -> Inertia:
-    """The inertia that the file gives, or where it gives none or an impossible one, that of its shapes: `evenly` spreads a mass."""
+def _given(
+    link: Element,
+    link_pose: Pose,
+    evenly: Callable[[float | None], Inertia],
+    context: Context,
+) -> Inertia:
+    """The inertia of the file, or where that has none or an impossible one, that of the shapes.
+
+    `evenly` spreads a mass over the shapes.
+    """
     element = link.find("inertial")
     if element is None:
         context.note("replaced", link, f"no <inertial>: {DEFAULT_MASS:g} kg, spread evenly over its shapes")
@@ -80,7 +88,10 @@ def _given(link: Element, link_pose: Pose, evenly: Callable[[float | None], Iner
 
 
 def moments_of(inertia: Element) -> tuple[Vector, Vector]:
-    """The moments ixx, iyy, izz and the products ixy, ixz, iyz in an `<inertia>`, kg m^2; NaN for what is no number."""
+    """The moments ixx, iyy, izz and the products ixy, ixz, iyz in an `<inertia>`, kg m^2.
+
+    NaN for what is no number.
+    """
     moments = vector(number_or_nan(inertia, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
     products = vector(number_or_nan(inertia, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
     return moments, products

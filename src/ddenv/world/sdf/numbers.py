@@ -25,7 +25,16 @@ from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario, Sensors
 from ddenv.world.sdf.moved import with_places
 from ddenv.world.sdf.read import parse_world
-from ddenv.world.sdf.xml import Edit, Element, edited, floats, parse, text_of, with_child, with_words
+from ddenv.world.sdf.xml import (
+    Edit,
+    Element,
+    edited,
+    floats,
+    parse,
+    text_of,
+    with_child,
+    with_words,
+)
 from ddenv.world.whole import whole_of
 
 # Less than this part of a number does not matter, unless it is a place or an angle.

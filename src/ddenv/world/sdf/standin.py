@@ -84,7 +84,7 @@ def parse_stand_in(text: str, where: str) -> StandIn:
 
 
 def placed(text: str, where: str) -> Placed:
-    """The shape written as `kind:sizes` or `kind:sizes@x,y,z`. Raises UserError beginning with `where`."""
+    """The shape of `kind:sizes` or `kind:sizes@x,y,z`. Raises UserError beginning with `where`."""
     kind, _, rest = text.partition(":")
     words, at, center = rest.partition("@")
     if kind not in SIZES:
@@ -94,7 +94,8 @@ def placed(text: str, where: str) -> Placed:
         raise UserError(f"{where}: {kind}: sizes must be positive, found '{words[:60]}'")
     shape = SHAPES[kind](*sizes)
     if at:
-        return Placed(shape, Pose(vector(_numbers(center, "x,y,z", f"{where}: the centre after @"))))
+        place = _numbers(center, "x,y,z", f"{where}: the centre after @")
+        return Placed(shape, Pose(vector(place)))
     return Placed(shape, Pose(vector((0.0, 0.0, shape_bounds(shape, HERE)[1][2]))))
 
 
@@ -132,7 +133,8 @@ def guess(uri: str, link: Element | None = None) -> tuple[Placed, str, str, Vect
     """
     model = model_named(uri)
     if known := KNOWN_SIZES.get(model):
-        return placed(known, "guess"), known, "the size of Gazebo's model", MESH_SCALES.get(model, ONE)
+        scale = MESH_SCALES.get(model, ONE)
+        return placed(known, "guess"), known, "the size of Gazebo's model", scale
     if link is not None and (box := _box_of_inertia(link)):
         return placed(box, "guess"), box, "the box that has the link's inertia", None
     if is_floor(uri):

@@ -103,7 +103,8 @@ class _Builder:
                 name = source.inner(keys)
                 if name and name not in self.instances:
                     node = keys.get("model_namespace", one.node)
-                    raise source.complain(node, f"there is no model instance '{name}' for the namespace")
+                    why = f"there is no model instance '{name}' for the namespace"
+                    raise source.complain(node, why)
 
     def _new_model(self, one: Directive) -> str:
         """The name of the model that `one` adds. Raises UserError if it is taken."""
@@ -130,7 +131,8 @@ class _Builder:
         part = replace(part, name=name)
         outer = Scope(_element(WORLD, *at), (source.path,), self.context, self.scopes)
         model = without_mass(assemble(part, name, outer, None, self.context), part.element)
-        model, turned = _at_positions(model, source.pairs(keys.get("default_joint_positions")), source)
+        positions = source.pairs(keys.get("default_joint_positions"))
+        model, turned = _at_positions(model, positions, source)
         self.models[name] = model
         self.elements[name] = include
         self.spans[name].append(one.span)
@@ -158,7 +160,8 @@ class _Builder:
         name = source.name_of(node)
         found = [each for each in self.frames if name == (each if "::" in name else each.rpartition("::")[2])]
         if not found:
-            raise source.complain(node, f"there is no frame '{name}' here{nearest(name, self.frames)}")
+            hint = nearest(name, self.frames)
+            raise source.complain(node, f"there is no frame '{name}' here{hint}")
         if len(found) > 1:
             raise source.complain(node, f"'{name}' may be {' or '.join(found[:3])}")
         return self.frames[found[0]]
@@ -253,7 +256,12 @@ class _Builder:
                 outer, parent = base.model, base.link
                 if outer in self.carriers:
                     outer, parent = self.carriers[outer][0], f"{outer}::{parent}"
-                weld = replace(weld, name=f"{name}::{weld.name}", parent=parent, child=f"{name}::{at}")
+                weld = replace(
+                    weld,
+                    name=f"{name}::{weld.name}",
+                    parent=parent,
+                    child=f"{name}::{at}",
+                )
                 self.carriers[name] = outer, weld
             else:
                 joints.append(weld)
@@ -321,8 +329,8 @@ class _Builder:
                     yield Shared(one.source.bytes_of(span), names)
 
     def _owners(self, one: Directive, key: str, groups: Mapping[str, frozenset[str]]) -> frozenset[str]:
-        owners = (self._owner(node, key, one.source, groups) for node in one.source.items(one.keys.get(key)))
-        return frozenset[str]().union(*owners)
+        nodes = one.source.items(one.keys.get(key))
+        return frozenset[str]().union(*(self._owner(node, key, one.source, groups) for node in nodes))
 
     def _owner(self, node: Node, key: str, source: Source, groups: Mapping[str, frozenset[str]]) -> frozenset[str]:
         """The models of a member, which is a body, or of a group. Raises UserError."""
@@ -399,7 +407,8 @@ def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -
         if joint is None:
             raise source.complain(node, f"there is no joint '{name}'{nearest(name, joints)}")
         if joint.kind not in ("revolute", "continuous", "prismatic"):
-            raise source.complain(node, f"only joints with one position are read; {joint.kind} is '{name}'")
+            why = f"only joints with one position are read; {joint.kind} is '{name}'"
+            raise source.complain(node, why)
         (position,) = source.numbers(node, 1)
         at[name] = position
         if joint.kind == "prismatic":
@@ -414,12 +423,13 @@ def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -
 
     def place(link: str) -> Pose:
         if link not in moved:
-            moved[link] = (place(parents[link]) if link in parents else HERE) @ turns.get(link, HERE)
+            base = place(parents[link]) if link in parents else HERE
+            moved[link] = base @ turns.get(link, HERE)
         return moved[link]
 
     links = tuple(_moved_link(link, place(link.name)) for link in model.links)
-    turned = tuple(_moved_joint(joint, place(joint.child), at.get(joint.name, 0.0)) for joint in model.joints)
-    return replace(model, links=links, joints=turned), moved
+    turned = (_moved_joint(one, place(one.child), at.get(one.name, 0.0)) for one in model.joints)
+    return replace(model, links=links, joints=tuple(turned)), moved
 
 
 def _moved_link(link: Link, by: Pose) -> Link:
