@@ -129,7 +129,7 @@ def _turn(each: Drawn) -> tuple[int, float, float]:
 
 
 def _color(model: Model) -> RGB:
-    for visual in (visual for link in model.links for visual in link.visuals):
+    for visual in model.visuals:
         if visual.color is not None and visual.color[3] > 0 and not isinstance(visual.shape, Plane):
             red, green, blue = (round(255 * min(1.0, max(0.0, part))) for part in visual.color[:3])
             return red, green, blue

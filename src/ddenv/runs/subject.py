@@ -258,7 +258,7 @@ def with_values(data: Data, values: Mapping[str, Value]) -> Data:
     """A scenario as plain data, with settings replaced by name; None or 0 takes back a limit. Raises UserError."""
     for name in values:
         if name not in SETTINGS:
-            raise UserError(f"options: no setting '{name}'{nearest(name, list(SETTINGS))}")
+            raise UserError(f"options: no setting '{name}'{nearest(name, SETTINGS)}")
     # A setting that sets several others comes first, so that each of these may be given, too.
     for name in sorted(values, key=lambda each: SETTINGS[each].stored):
         put(data, SETTINGS[name], (values[name] or None) if SETTINGS[name].none else values[name])

@@ -197,7 +197,7 @@ def note_unseen(world: World, among: Collection[str]) -> Iterator[tuple[str, str
 
     A world without any visual is not made to be looked at.
     """
-    if not any(link.visuals for model in world.models for link in model.links):
+    if not any(model.visuals for model in world.models):
         return
     # A visual that was not read may be there.
     unread = {note.model for note in world.notes if note.kind == "ignored"}
@@ -212,8 +212,7 @@ def note_unseen(world: World, among: Collection[str]) -> Iterator[tuple[str, str
 def _unlike(model: Model) -> str:
     """In which way, of those in UNLIKE, what can be hit of a model is unlike what is seen of it; "" if it is not."""
     hit = model_bounds(model)
-    visuals = (visual for link in model.links for visual in link.visuals)
-    seen = around(shape_bounds(visual.shape, visual.pose) for visual in visuals)
+    seen = around(shape_bounds(visual.shape, visual.pose) for visual in model.visuals)
     if seen is None:
         return "" if hit is None else "unseen"
     size = seen[1] - seen[0]
@@ -226,9 +225,9 @@ def _unlike(model: Model) -> str:
 
 def inside(world: World) -> list[Inside]:
     """Models of which one can move, and one starts deeper than `INSIDE` in the other."""
-    shapes = [(model, one) for model in world.models for one in model.collisions]
+    shapes, boxes = _shapes(world)
     deepest: dict[tuple[str, str], float] = {}
-    for first, second in islice(_near(shapes), MOST_PAIRS):
+    for first, second in islice(_near(shapes, boxes), MOST_PAIRS):
         (model, shape), (other, obstacle) = shapes[first], shapes[second]
         # What cannot move, or has no end, is the obstacle.
         if model.static or isinstance(shape.shape, Plane):
@@ -240,9 +239,12 @@ def inside(world: World) -> list[Inside]:
     return [Inside(*pair, depth) for pair, depth in deepest.items()]
 
 
-def _near(shapes: Sequence[tuple[Model, Collision]]) -> Iterator[tuple[int, int]]:
-    """The shapes of two models that may overlap, one of which can move: by the boxes around them, swept along x."""
-    low, high = stacked(filled_bounds(one) for _, one in shapes)
+def _near(shapes: Sequence[tuple[Model, Collision]], boxes: Bounds) -> Iterator[tuple[int, int]]:
+    """The shapes of two models that may overlap, one of which can move.
+
+    By the `boxes` around them, swept along x.
+    """
+    low, high = boxes
     free = np.array([not model.static for model, _ in shapes], dtype=bool)
     names = {id(model): number for number, (model, _) in enumerate(shapes)}
     owners = np.array([names[id(model)] for model, _ in shapes], dtype=int)
@@ -271,7 +273,7 @@ def drop(world: World, robot: Model, spawn: Spawn) -> float:
     place = spawn_pose(spawn) @ robot.pose.inverse()
     boxes = [shape_bounds(one.shape, place @ one.pose) for one in robot.collisions if not isinstance(one.shape, Plane)]
     heights = []
-    for collision in (one for model in world.models for one in model.collisions):
+    for collision in world.collisions:
         low, high = shape_bounds(collision.shape, collision.pose)
         endless = isinstance(collision.shape, Plane)
         below = (bottom for bottom, top in boxes if endless or ((bottom < high)[:2].all() and (low < top)[:2].all()))

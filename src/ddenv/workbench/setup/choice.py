@@ -77,7 +77,7 @@ class Choice:
         from ddenv.world.model import Plane
 
         tops = []
-        for collision in (each for model in self.world.models for each in model.collisions):
+        for collision in self.world.collisions:
             if isinstance(collision.shape, Plane):
                 tops.append(float(collision.pose.position[2]))
                 continue
