@@ -56,7 +56,7 @@ def terminal_map(
     for sign, each in sorted(zip(signs(models), models, strict=True), key=lambda each: -each[1].outline.area):
         (x, y, _), size = each.center, " x ".join(f"{part:.2f}" for part in each.size)
         if each.model.name not in dim:
-            size = size if each.outline.polygons else "no shapes"
+            size = size if any(each.size) else "no shapes"
             entries.append((sign, each.model.name, f"{x:.2f}, {y:.2f}", size))
     legend = _legend(entries, columns, max(3, rows // 3))
     view = _view(low, high, columns - AXIS, rows - AROUND - len(legend))

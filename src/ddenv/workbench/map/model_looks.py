@@ -111,7 +111,9 @@ def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
 @lru_cache(maxsize=4)
 def _known(prints: tuple[Footprint, ...]) -> tuple[Names, np.ndarray]:
     areas = np.array([each.area for each in prints])
-    return tuple(each.name for each in prints), areas > FLOOR_FACTOR * (float(np.median(areas)) if len(areas) else 0.0)
+    large = areas > FLOOR_FACTOR * (float(np.median(areas)) if len(areas) else 0.0)
+    hollow = np.array([each.hollow for each in prints], dtype=bool)
+    return tuple(each.name for each in prints), large & ~hollow
 
 
 def _signs(names: Names, kinds: np.ndarray, parts: np.ndarray, who: Kept) -> Signs:
