@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ddenv.map.colors import RGB
-from ddenv.world.extent import circle, convex_hull, model_bounds, polygon_area, shape_bounds, vertices_of
-from ddenv.world.model import Model, Plane, World, is_ground
+from ddenv.world.extent import circle, convex_hull, filled_bounds, model_bounds, polygon_area, shape_bounds, vertices_of
+from ddenv.world.model import Box, Model, Plane, World, is_ground
 from ddenv.world.pose import HERE, Point, Pose, Vector, vector
 
 # Corners of the polygon that stands for a circle on a character map.
@@ -23,9 +23,8 @@ FLOOR_FACTOR = 12.0
 FLOOR_AREA = 6.0  # m^2
 # A model is hollow, like the walls of a building, if it covers less than this share of the rectangle around it.
 HOLLOW = 0.5
-# What hangs higher than this above the foot of its model, or a whole model above the ground, closes no door, m.
+# What hangs higher than this above the foot of its model and above the ground closes no door, m.
 HEAD = 1.0
-FLAT = 0.3  # the maximum height of a floor that is the ground, m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,34 +63,30 @@ class Footprint:
 
 def footprints(world: World) -> tuple[Footprint, ...]:
     """Footprints of all models except the ground; those that cover most come first, so that small ones are drawn on top."""
-    prints = [outline for _, outline in _outlines(world, ROUND)]
+    ground = ground_height(world)
+    prints = [footprint(model, ground=ground) for model in world.models if not is_ground(model)]
     return tuple(sorted(prints, key=lambda each: -each.covered))
 
 
-def _outlines(world: World, corners: int) -> list[tuple[Model, Footprint]]:
-    """All models except the ground with their footprints; those that hang far above the ground have no polygons."""
-    models = [(model, footprint(model, corners)) for model in world.models if not is_ground(model)]
-    boxes = {model.name: model_bounds(model) or (model.pose.position,) * 2 for model in world.models}
-    # The ground, or else the largest floor: nothing hangs above hills.
-    largest = max((outline for _, outline in models), key=lambda each: each.covered, default=None)
-    grounds = [model.name for model in world.models if is_ground(model)] or ([largest.name] if largest else [])
-    flat = [boxes[name][1][2] for name in grounds if boxes[name][1][2] - boxes[name][0][2] < FLAT]
-    head = min(flat, default=math.inf) + HEAD
-    return [
-        (model, replace(outline, polygons=()) if boxes[model.name][0][2] > head else outline)
-        for model, outline in models
+def ground_height(world: World) -> float:
+    """The height of the lowest of the largest planes and boxes, m; infinite without any: a mesh may be hills."""
+    flat = [
+        filled_bounds(one) for model in world.models for one in model.collisions if isinstance(one.shape, Plane | Box)
     ]
+    areas = [float(np.prod((high - low)[:2])) for low, high in flat]
+    least = max(areas, default=0.0) / 2
+    return min((float(high[2]) for area, (_, high) in zip(areas, flat, strict=True) if area >= least), default=math.inf)
 
 
-def footprint(model: Model, corners: int = ROUND, moved: Pose = HERE) -> Footprint:
+def footprint(model: Model, corners: int = ROUND, moved: Pose = HERE, ground: float = math.inf) -> Footprint:
     """The footprint of `model`; a point without collision shapes. Circles become polygons with `corners` corners.
 
-    Pieces that begin more than `HEAD` above its lowest point, such as the wall above a door, are left out.
+    Pieces that begin more than `HEAD` above its lowest point and the `ground` (m), such as the wall above a door, are left out.
     `moved` is how the model has moved as a whole since the world's file, in the world frame.
     """
     polygons = []
     pieces = [(each, shape_bounds(each.shape, moved @ each.pose)[0][2]) for each in model.collisions]
-    lowest = min((foot for _, foot in pieces), default=0.0)
+    lowest = min([ground, *(foot for _, foot in pieces)])
     for each, foot in pieces:
         if not isinstance(each.shape, Plane) and foot <= lowest + HEAD:
             pose = moved @ each.pose
@@ -143,11 +138,12 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
 
     Of equal tops the larger model comes first. Circles become polygons with `corners` corners.
     """
-    models = _outlines(world, corners)
-    areas = [outline.area for _, outline in models]
-    limit = max(FLOOR_AREA, FLOOR_FACTOR * float(np.median(areas))) if models else 0.0
+    ground = ground_height(world)
+    models = [model for model in world.models if not is_ground(model)]
+    outlines = [footprint(model, corners, ground=ground) for model in models]
+    limit = max(FLOOR_AREA, FLOOR_FACTOR * float(np.median([each.area for each in outlines]))) if models else 0.0
     drawn = []
-    for model, outline in models:
+    for model, outline in zip(models, outlines, strict=True):
         center, size = model.pose.position, (0.0, 0.0, 0.0)
         if (box := model_bounds(model)) is not None:
             center, size = vector((box[0] + box[1]) / 2), vector(box[1] - box[0])
@@ -164,9 +160,9 @@ def _turn(each: Drawn) -> tuple[int, float, float]:
 
 def _color(model: Model) -> RGB:
     for visual in (visual for link in model.links for visual in link.visuals):
-        if visual.color is None or min(visual.color[:3]) > WHITE:
-            continue
-        if visual.color[3] > 0 and not isinstance(visual.shape, Plane):
+        if visual.color is not None and visual.color[3] > 0 and not isinstance(visual.shape, Plane):
+            if min(visual.color[:3]) > WHITE:
+                break
             red, green, blue = (round(255 * min(1.0, max(0.0, part))) for part in visual.color[:3])
             return red, green, blue
     return STATIC if model.static else DYNAMIC

@@ -29,6 +29,7 @@ MARGIN = 2.5
 GAP = 1e-4
 # The least vertical part of the unit normal of a face: that of an upright one counts as this.
 UPRIGHT = 1e-6
+BALL = vertices_of(Ellipsoid((1.0, 1.0, 1.0)))[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,8 +107,7 @@ def _tops(one: Collision, middles: Floats, cell: float) -> Floats:
 
     corners, radius = vertices_of(one.shape)
     if radius:
-        ball, _ = vertices_of(Ellipsoid((radius, radius, radius)))
-        corners = (corners[:, None] + ball).reshape(-1, 3)
+        corners = (corners[:, None] + radius * BALL).reshape(-1, 3)
     corners = corners @ one.pose.rotation().T + one.pose.position
     tops = np.full(middles.shape[:2], math.inf)
     bottoms = -tops
