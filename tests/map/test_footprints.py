@@ -119,6 +119,9 @@ def test_a_building_is_its_walls_with_its_doors_open_and_what_hangs_is_a_point()
     assert walls.outline.distance((0.0, -3.0)) == pytest.approx(1.0)
     assert models["lamp"].outline.polygons == ()
     assert models["lamp"].size == pytest.approx((1.2, 0.8, 0.3))
+    # Above a trench the ground is what is beside it.
+    raised = {each.model.name: each for each in drawn(box("quay", 0, 0, size=(6, 6, 2)), box("tile", 0, 0, z=2))}
+    assert raised["tile"].outline.polygons
     # One outline around it would close it.
     frame = Frame.around(list(models.values()), [], 0.1, 2.0, (800.0, 600.0), (0.0, 0.0), (0.0, 0.0))
     assert path_of(walls, frame, coarse=True) == path_of(walls, frame)

@@ -23,7 +23,7 @@ FLOOR_FACTOR = 12.0
 FLOOR_AREA = 6.0  # m^2
 # A model is hollow, like the walls of a building, if it covers less than this share of the rectangle around it.
 HOLLOW = 0.5
-# What hangs higher than this above the foot of its model and above the ground closes no door, m.
+# What hangs higher than this above the ground closes no door, m.
 HEAD = 1.0
 
 
@@ -69,26 +69,26 @@ def footprints(world: World) -> tuple[Footprint, ...]:
 
 
 def ground_height(world: World) -> float:
-    """The height of the lowest of the largest planes and boxes, m; infinite without any: a mesh may be hills."""
+    """The height of the highest plane or large box, m; infinite without any: a mesh may be hills."""
     flat = [
         filled_bounds(one) for model in world.models for one in model.collisions if isinstance(one.shape, Plane | Box)
     ]
-    areas = [float(np.prod((high - low)[:2])) for low, high in flat]
-    least = max(areas, default=0.0) / 2
-    return min((float(high[2]) for area, (_, high) in zip(areas, flat, strict=True) if area >= least), default=math.inf)
+    tops = [float(high[2]) for low, high in flat if np.prod((high - low)[:2]) > FLOOR_AREA]
+    return max(tops, default=math.inf)
 
 
 def footprint(model: Model, corners: int = ROUND, moved: Pose = HERE, ground: float = math.inf) -> Footprint:
     """The footprint of `model`; a point without collision shapes. Circles become polygons with `corners` corners.
 
-    Pieces that begin more than `HEAD` above its lowest point and the `ground` (m), such as the wall above a door, are left out.
+    Pieces that begin more than `HEAD` above the `ground` (m), or else above its lowest point, are left out: the wall above a door.
     `moved` is how the model has moved as a whole since the world's file, in the world frame.
     """
     polygons = []
     pieces = [(each, shape_bounds(each.shape, moved @ each.pose)[0][2]) for each in model.collisions]
-    lowest = min([ground, *(foot for _, foot in pieces)])
+    if math.isinf(ground):
+        ground = min((foot for _, foot in pieces), default=0.0)
     for each, foot in pieces:
-        if not isinstance(each.shape, Plane) and foot <= lowest + HEAD:
+        if not isinstance(each.shape, Plane) and foot <= ground + HEAD:
             pose = moved @ each.pose
             vertices, radius = vertices_of(each.shape, corners)
             flat = vertices @ pose.rotation()[:2].T + pose.position[:2]
