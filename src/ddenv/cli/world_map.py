@@ -58,7 +58,7 @@ def terminal_map(
             continue
         x, y, _ = each.center
         size = "no shapes"
-        if each.outline.polygons:
+        if any(each.size):
             size = " x ".join(f"{part:.2f}" for part in each.size)
         entries.append((sign, each.model.name, f"{x:.2f}, {y:.2f}", size))
     legend = _legend(entries, columns, max(3, rows // 3))

@@ -292,7 +292,7 @@ def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
     if scenario.reading.inside and not any(model.inside for model in world.models):
         why = next((note.why for note in world.notes if note.what == "--inside"), "no static model has two collisions")
         raise UserError(f"{scenario.world}: --inside: no model has parts that can be removed: {why}")
-    check_spawn(world, robot, scenario.robot.spawn)
+    check_spawn(world, robot, scenario.robot.spawn, scenario.goal)
 
 
 # From a run file.

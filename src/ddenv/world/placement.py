@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product, starmap
 
@@ -14,8 +14,9 @@ from ddenv.text import count, first_of
 from ddenv.world.drive import turning_links
 from ddenv.world.extent import Bounds, around, bounds, filled_bounds, model_bounds, shape_bounds, stacked, vertices_of
 from ddenv.world.model import Collision, Mesh, Model, Plane, Shape, World, is_ground
-from ddenv.world.pose import Point, Pose
-from ddenv.world.scenario import Spawn
+from ddenv.world.passage import Clearance, clearance
+from ddenv.world.pose import Pose
+from ddenv.world.scenario import Goal, Spawn
 
 # Tolerated overlap, m: contacts at rest overlap slightly, and numbers in files are rounded.
 TOLERANCE = 0.02
@@ -39,9 +40,9 @@ def spawn_pose(spawn: Spawn) -> Pose:
     return Pose.from_rpy(spawn.x, spawn.y, spawn.z, 0.0, 0.0, spawn.yaw)
 
 
-def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
+def check_spawn(world: World, robot: Model, spawn: Spawn, goal: Goal | None = None) -> None:
     """Raises UserError if the robot, placed at `spawn`, stands inside a model or below the ground; it names a free place nearby."""
-    if found := stands_inside(world, robot, spawn):
+    if found := stands_inside(world, robot, spawn, goal):
         why, free = found
         hint = (
             "move the spawn" if free is None else f"free nearby: --spawn={free.x:g},{free.y:g},{free.z:g},{free.yaw:g}"
@@ -49,10 +50,12 @@ def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
         raise UserError(f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g}): {why}; {hint}")
 
 
-def stands_inside(world: World, robot: Model, spawn: Spawn) -> tuple[str, Spawn | None] | None:
+def stands_inside(
+    world: World, robot: Model, spawn: Spawn, goal: Goal | None = None
+) -> tuple[str, Spawn | None] | None:
     """That the robot at `spawn` stands inside a model, in words, and the nearest free place; None if its own is free.
 
-    That is on a grid of `STEP`; None if there is none within `FAR`.
+    That is on a grid of `STEP`; None if there is none within `FAR`. Places from which a way leads to the `goal` come first.
     Raises UserError for a robot without collision shapes.
     """
     shapes, boxes = _shapes(world)
@@ -68,10 +71,53 @@ def stands_inside(world: World, robot: Model, spawn: Spawn) -> tuple[str, Spawn 
     heights = [0.0, depth + 0.01]
     sides = [number * STEP for number in range(-round(FAR / STEP), round(FAR / STEP) + 1)]
     moves = sorted(product(sides, sides, heights), key=lambda move: math.hypot(*move))
-    free = next((place for place in starmap(moved, moves) if _obstacle(shapes, boxes, robot, place) is None), None)
+    places: Iterable[Spawn] = starmap(moved, moves)
+    if goal is not None:
+        places = _by_room(places, world, robot, spawn, goal)
+    free = next((place for place in places if _obstacle(shapes, boxes, robot, place) is None), None)
     # The hull of a hollow mesh fills space that looks free.
     what = "the convex hull of model" if isinstance(shape, Mesh) else "model"
     return f"the robot stands inside {what} '{model.name}' by {depth:.2f} m", free
+
+
+def _by_room(places: Iterable[Spawn], world: World, robot: Model, spawn: Spawn, goal: Goal) -> list[Spawn]:
+    """Places near `spawn`, sorted: outdoors last if the goal is not, first those from which the robot gets to the goal."""
+    room, width = _clearance(world, robot, spawn, goal)
+    end = room.near((goal.x, goal.y), goal.tolerance)
+    outdoors = room.outdoors()
+    outdoors &= not outdoors[end].any()
+    # Where it stands, it has less room than between two columns that block it.
+    inside = room.joined(width - room.cell, end)
+    worse = 2 * outdoors + ~inside
+
+    def badness(place: Spawn) -> int:
+        column = (np.array((place.x, place.y)) - room.middles[0, 0]) / room.cell
+        return int(worse[tuple(np.rint(column).astype(int))])
+
+    return sorted(places, key=badness)
+
+
+def _clearance(world: World, robot: Model, spawn: Spawn, goal: Goal) -> tuple[Clearance, float]:
+    """The clearance of the robot on the height on which it comes to stand, and its width, m."""
+    own = bounds(robot.collisions, robot.pose.inverse())
+    assert own is not None
+    size = own[1] - own[0]
+    # Which side is its front is not known.
+    width = float(size[:2].min())
+    level = spawn.z + float(own[0][2]) - drop(world, robot, spawn)
+    return clearance(world, width, float(size[2]), level, [(spawn.x, spawn.y), (goal.x, goal.y)]), width
+
+
+def note_passage(world: World, robot: Model, spawn: Spawn, goal: Goal) -> Iterator[tuple[str, str]]:
+    """That no way from the start to the goal is wide enough for the robot."""
+    room, width = _clearance(world, robot, spawn, goal)
+    start = room.near((spawn.x, spawn.y), width / 2)
+    end = room.near((goal.x, goal.y), goal.tolerance)
+    if room.joined(width + room.cell / 2, start)[end].any():
+        return
+    widest = room.widest(start, end)
+    wide = f"no way from start to goal is wider than {widest:.2f} m: the robot is {width:.2f} m wide"
+    yield "passage", wide if widest else "no way leads from start to goal"
 
 
 def at_start(world: World, robot: Model, spawn: Spawn) -> Model | None:
@@ -136,8 +182,8 @@ class Inside:
     depth: float
 
 
-def notes_on_start(world: World, robot: Model, spawn: Spawn, goal: Point | None = None) -> Iterator[tuple[str, str]]:
-    """What is wrong with the start of the robot in `world`, and with its `goal` (x, y), m: a word and a sentence for each."""
+def notes_on_start(world: World, robot: Model, spawn: Spawn, goal: Goal | None = None) -> Iterator[tuple[str, str]]:
+    """What is wrong with the start of the robot in `world`, and with its `goal`: a word and a sentence for each."""
     height = drop(world, robot, spawn)
     if height > DROP:
         yield "drop", f"the robot starts {height:.2f} m above the surface below it and drops; lower the spawn's z"
@@ -149,15 +195,22 @@ def notes_on_start(world: World, robot: Model, spawn: Spawn, goal: Point | None 
             "wheels",
             f"no wheel touches anything: the robot stands on its body, its wheels {hanging:.2f} m above the ground",
         )
+    if goal is not None:
+        yield from _note_goal(world, goal, spawn.z)
+        yield from note_passage(world, robot, spawn, goal)
+    yield from note_inside(world)
+
+
+def _note_goal(world: World, goal: Goal, height: float) -> Iterator[tuple[str, str]]:
+    """That the goal lies inside a model at this height, m."""
     # Planes and meshes may be ground.
     solid = (
         (model, one) for model in world.models for one in model.collisions if not isinstance(one.shape, (Plane, Mesh))
     )
-    place = Hull(np.array([[*(goal or ()), spawn.z]]))
-    blocker = next((model.name for model, one in solid if goal and _depth(place, one) > TOLERANCE), None)
+    place = Hull(np.array([[goal.x, goal.y, height]]))
+    blocker = next((model.name for model, one in solid if _depth(place, one) > TOLERANCE), None)
     if blocker is not None:
         yield "goal", f"at the height of the start, the goal lies inside {blocker}; move the goal"
-    yield from note_inside(world)
 
 
 def note_floor(world: World, robot: Model, spawn: Spawn, removable: Collection[str]) -> Iterator[tuple[str, str]]:
