@@ -13,7 +13,7 @@ from ddenv.errors import UserError
 from ddenv.text import count, first_of
 from ddenv.world.drive import turning_links
 from ddenv.world.extent import Bounds, around, bounds, filled_bounds, model_bounds, shape_bounds, stacked, vertices_of
-from ddenv.world.model import Collision, Mesh, Model, Plane, Shape, World, is_ground
+from ddenv.world.model import Collision, Mesh, Model, Plane, World, is_ground
 from ddenv.world.passage import Clearance, clearance
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Goal, Spawn
@@ -61,7 +61,7 @@ def stands_inside(
     shapes, boxes = _shapes(world)
     if (found := _obstacle(shapes, boxes, robot, spawn)) is None:
         return None
-    model, depth, shape = found
+    model, depth, collision = found
 
     def moved(x: float, y: float, z: float) -> Spawn:
         places = {"x": round(spawn.x + x, 2), "y": round(spawn.y + y, 2), "z": round(spawn.z + z, 2)}
@@ -76,7 +76,8 @@ def stands_inside(
         places = _by_room(places, world, robot, spawn, goal)
     free = next((place for place in places if _obstacle(shapes, boxes, robot, place) is None), None)
     # The hull of a hollow mesh fills space that looks free.
-    what = "the convex hull of model" if isinstance(shape, Mesh) else "model"
+    is_hull = isinstance(collision.shape, Mesh) and collision.piece is None
+    what = "the convex hull of model" if is_hull else "model"
     return f"the robot stands inside {what} '{model.name}' by {depth:.2f} m", free
 
 
@@ -134,7 +135,7 @@ def _shapes(world: World) -> tuple[list[tuple[Model, Collision]], Bounds]:
 
 def _obstacle(
     shapes: Sequence[tuple[Model, Collision]], boxes: Bounds, robot: Model, spawn: Spawn
-) -> tuple[Model, float, Shape] | None:
+) -> tuple[Model, float, Collision] | None:
     """The first model that the robot at `spawn` is inside of, how deep, m, and in which shape; None if its place is free.
 
     `boxes` are around the shapes of all models, which come one model after another.
@@ -144,14 +145,14 @@ def _obstacle(
     if own is None:
         raise UserError(f"robot.model: '{robot.name}' has no collision shapes")
     bodies = [hull(one, place) for one in robot.collisions if not isinstance(one.shape, Plane)]
-    found: tuple[Model, float, Shape] | None = None
+    found: tuple[Model, float, Collision] | None = None
     near = ((own[0] <= boxes[1]) & (boxes[0] <= own[1])).all(axis=1)
     for model, one in (shapes[number] for number in np.flatnonzero(near).tolist()):
         if found is not None and found[0] is not model:
             break
         depth = max(_depth(body, one) for body in bodies)
         if depth > (TOLERANCE if found is None else found[1]):
-            found = model, depth, one.shape
+            found = model, depth, one
     return found
 
 
