@@ -44,7 +44,7 @@ from ddenv.world.placement import (
     overlap,
 )
 from ddenv.world.pose import Pose
-from ddenv.world.scenario import Spawn
+from ddenv.world.scenario import Goal, Spawn
 from ddenv.world.sdf.read import parse_world, read_model, read_world
 from tests.conftest import DATA
 from tests.robot.conftest import GROUND, box_model
@@ -262,8 +262,8 @@ def test_wheels_in_the_air_and_a_world_that_pulls_nothing_down_are_noted():
 
 def test_a_goal_inside_a_post_is_noted():
     start = Spawn(x=0, y=0, z=0.45)
-    assert [about for about, _ in notes_on_start(WALL, HUSKY, start, (0.0, -4.0))] == ["goal"]
-    assert list(notes_on_start(WALL, HUSKY, start, (0.0, -3.0))) == []
+    assert [about for about, _ in notes_on_start(WALL, HUSKY, start, Goal(x=0, y=-4))] == ["goal", "passage"]
+    assert list(notes_on_start(WALL, HUSKY, start, Goal(x=0, y=-3))) == []
 
 
 @pytest.mark.parametrize(

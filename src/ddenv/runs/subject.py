@@ -258,7 +258,7 @@ def with_values(data: Data, values: Mapping[str, Value]) -> Data:
     """A scenario as plain data, with settings replaced by name; None or 0 takes back a limit. Raises UserError."""
     for name in values:
         if name not in SETTINGS:
-            raise UserError(f"options: no setting '{name}'{nearest(name, list(SETTINGS))}")
+            raise UserError(f"options: no setting '{name}'{nearest(name, SETTINGS)}")
     # A setting that sets several others comes first, so that each of these may be given, too.
     for name in sorted(values, key=lambda each: SETTINGS[each].stored):
         put(data, SETTINGS[name], (values[name] or None) if SETTINGS[name].none else values[name])
@@ -292,7 +292,7 @@ def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
     if scenario.reading.inside and not any(model.inside for model in world.models):
         why = next((note.why for note in world.notes if note.what == "--inside"), "no static model has two collisions")
         raise UserError(f"{scenario.world}: --inside: no model has parts that can be removed: {why}")
-    check_spawn(world, robot, scenario.robot.spawn)
+    check_spawn(world, robot, scenario.robot.spawn, scenario.goal)
 
 
 # From a run file.

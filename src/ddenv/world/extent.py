@@ -168,7 +168,7 @@ BEYOND = 20.0  # minimum width of ground beyond all models, m
 
 def corners(world: World) -> tuple[Vector, Vector] | None:
     """The lowest and the highest corner of the box around all models, m; None if there are none."""
-    box = bounds(one for model in world.models for one in model.collisions)
+    box = bounds(world.collisions)
     return None if box is None else (vector(box[0]), vector(box[1]))
 
 
@@ -177,7 +177,7 @@ def with_ground_boxes(world: World, box: tuple[Vector, Vector] | None, places: I
 
     Drake crashes with half spaces among hundreds of boxes, and on the bodies that its parser makes of static models (drake#19263).
     """
-    if not any(isinstance(one.shape, Plane) for model in world.models for one in model.collisions):
+    if not any(isinstance(one.shape, Plane) for one in world.collisions):
         return world
     within = product(*zip(*box, strict=True)) if box else ()
     points = np.array([*within, *places], dtype=float).reshape(-1, 3)

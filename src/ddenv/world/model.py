@@ -202,6 +202,10 @@ class Model:
     def collisions(self) -> tuple[Collision, ...]:
         return tuple(collision for link in self.links for collision in link.collisions)
 
+    @property
+    def visuals(self) -> tuple[Visual, ...]:
+        return tuple(visual for link in self.links for visual in link.visuals)
+
 
 def held_with(model: Model, name: str) -> frozenset[str]:
     """The link `name` (or "world") and all that fixed joints hold together with it, directly or through others."""
@@ -294,6 +298,10 @@ class World:
         raise KeyError(name)
 
     @property
+    def collisions(self) -> tuple[Collision, ...]:
+        return tuple(collision for model in self.models for collision in model.collisions)
+
+    @property
     def names(self) -> Names:
         """The names of all models, in the file's order."""
         return tuple(model.name for model in self.models)
@@ -319,7 +327,7 @@ def is_ground(model: Model) -> bool:
     """
     if any(isinstance(collision.shape, Ground) for collision in model.collisions):
         return True
-    shown = any(isinstance(visual.shape, Plane) for link in model.links for visual in link.visuals)
+    shown = any(isinstance(visual.shape, Plane) for visual in model.visuals)
     boxes = (one.shape.size for one in model.collisions if isinstance(one.shape, Box)) if shown else ()
     return any(min(size[:2]) >= ENDLESS for size in boxes)
 

@@ -29,7 +29,7 @@ def bilinear(grid: Floats, row: Floats, column: Floats) -> Floats:
     return values
 
 
-def clearance(terrain: Terrain, pose: Pose, places: Floats) -> float:
+def height_above(terrain: Terrain, pose: Pose, places: Floats) -> float:
     """How high the lowest of `places` (N, 3) m is above the surface of terrain at `pose`, m; infinite where there is no ground."""
     back = pose.inverse()
     x, y, z = (places @ back.rotation().T + back.position).T

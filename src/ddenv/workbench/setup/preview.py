@@ -43,6 +43,9 @@ REMEDIES = {
     "drop": "lower the spawn's z",
     "goal": "move the goal",
     "inside": "move one model, or make both static",
+    "gravity": "let it point down",
+    "wheels": "see where its wheels are",
+    "passage": "move the start or the goal",
 }
 KEYS = {"start": "s", "heading": "h", "goal": "g"}
 ASKS = {
@@ -325,8 +328,9 @@ class Preview(Vertical):
         with suppress(UserError):
             if spawn is not None and (robot := choice.robot):
                 start = Spawn(x=spawn[0], y=spawn[1], z=spawn[2], yaw=spawn[3])
-                found = tuple(notes_on_start(choice.world, robot, start, (goal[0], goal[1]) if goal else None))
-                if (inside := stands_inside(choice.world, robot, start)) is not None:
+                end = choice.settings.goal.model_copy(update={"x": goal[0], "y": goal[1]}) if goal else None
+                found = tuple(notes_on_start(choice.world, robot, start, end))
+                if (inside := stands_inside(choice.world, robot, start, end)) is not None:
                     why, place = inside
                     found, free = (("start", why), *found), None if place is None else (place.x, place.y)
         if not worker.is_cancelled:

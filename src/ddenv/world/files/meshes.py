@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ddenv.text import truncated
 from ddenv.world.access import Unusable, read
 from ddenv.world.files.dae import read_dae
 from ddenv.world.files.gltf import read_gltf
@@ -68,8 +69,7 @@ def read_parts(path: Path) -> list[Part]:
 
 
 def _line(text: str) -> str:
-    text = " ".join(text.split())
-    return text if len(text) <= 200 else text[:199] + "…"
+    return truncated(" ".join(text.split()), 200)
 
 
 def build(parts: list[Part], submesh: str = "", center: bool = False, convex: bool = False) -> bytes:

@@ -28,7 +28,7 @@ from ddenv.world.pose import Vector
 # A piece that leaves at most this share of its hull empty is that hull.
 EMPTY = 0.002
 # So is one that leaves at most so much empty, m^3 (a cube of 4 cm), or this share of the whole mesh's hull, whichever is less.
-# Beyond `MANY` pieces this grows with the square of their number: what is finer costs more time than it is worth.
+# Beyond `MANY` cuts this grows with the square of their number: what is finer costs more time than it is worth.
 LITTLE = 6e-5
 LITTLE_SHARE = 3e-4
 MANY = 64
@@ -43,9 +43,13 @@ BEYOND = 1e-7  # how far beyond a face a cut is, as a share of the size
 MOST_PLANES = 40
 FEWEST_PLANES = 6
 CHECKED_TRIANGLES = 20_000
-# A finer part is simplified, by at most this share of its size, since each of its cuts takes long.
+# A finer part is simplified, by at most so many m, since each of its cuts takes long.
 MOST_TRIANGLES = 4_000
-SIMPLER = 0.005
+SIMPLER = 0.01
+# Triangles times planes that are looked at for one mesh, some 20 s: what is not cut by then is its hull.
+MOST_WORK = 10_000_000
+# A plane's unit normal (3,), and its distance from the origin along that, m.
+Plane = tuple[Floats, float]
 
 
 def build_pieces(parts: list[Part], submesh: str, center: bool, scale: Vector, most: int) -> bytes:
@@ -78,12 +82,18 @@ def convex_pieces(vertices: Floats, faces: Integers, most: int) -> list[Surface]
             solids += _plates(part)
         else:
             uneven.append(part.triangles)
-    patches = _patches(uneven, MOST_PATCHES)
+    most_patches = min(MOST_PATCHES, most // 4)
+    patches = _patches(uneven, most_patches)
     little = min(LITTLE, LITTLE_SHARE * trimesh.Trimesh(*whole, process=False).volume)
-    hulls = (_rounded(hull) for hull in _cut(solids, most - len(patches), little))
-    pieces = [_surface(hull) for hull in hulls if not hull.is_empty()]
+    hulls = sorted(_cut(solids, most - len(patches), little), key=Manifold.volume, reverse=True)
+    pieces = [_surface(hull) for hull in hulls]
+    if len(pieces) + len(patches) > most:
+        # Of more solids than that the smallest are joined where they are near each other.
+        small = pieces[most - 2 * most_patches :]
+        pieces = pieces[: most - 2 * most_patches]
+        patches += _patches([vertices[faces] for vertices, faces in small], most_patches)
     pieces += [convex_hull(corners) for corners in patches]
-    return pieces if 1 < len(pieces) <= most else [whole]
+    return pieces if len(pieces) > 1 else [whole]
 
 
 def connected_parts(vertices: Floats, faces: Integers) -> list[trimesh.Trimesh]:
@@ -168,7 +178,7 @@ def union(outlines: Iterable[CrossSection]) -> CrossSection:
 
 
 def _cut(solids: Iterable[Manifold], most: int, little: float) -> list[Manifold]:
-    """The hulls of the convex pieces of `solids`, about `most`: what fills its hull least is cut first.
+    """The hulls of the convex pieces of `solids`: what fills its hull least is cut first, with `most` cuts.
 
     What leaves `little` (m^3) empty is not cut.
     """
@@ -187,30 +197,33 @@ def _cut(solids: Iterable[Manifold], most: int, little: float) -> list[Manifold]
 
     for solid in solids:
         add(_simplified(solid))
-    while waiting and (number := len(waiting) + len(done)) < most:
-        if -waiting[0][0] < little * (number / MANY) ** 2:
+    work = 0
+    cuts = 0
+    while waiting and work < MOST_WORK and cuts < most:
+        if -waiting[0][0] < little * (cuts / MANY) ** 2:
             break
+        cuts += 1
         part = heapq.heappop(waiting)[-1]
-        halves = _halves(part)
+        planes = _planes(part)
+        work += part.num_tri() * len(planes)
+        halves = _halves(part, planes)
         if not halves:
             done.append(part.hull())
         for half in halves:
             add(half)
-    return done + [part.hull() for _, _, part in waiting]
+    hulls = (_rounded(hull) for hull in (*done, *(part.hull() for _, _, part in waiting)))
+    return [hull for hull in hulls if not hull.is_empty()]
 
 
 def _simplified(solid: Manifold) -> Manifold:
-    low, high = np.reshape(solid.bounding_box(), (2, 3))
-    if solid.num_tri() <= MOST_TRIANGLES:
-        return solid
-    return solid.simplify(SIMPLER * float((high - low).max()))
+    return solid if solid.num_tri() <= MOST_TRIANGLES else solid.simplify(SIMPLER)
 
 
-def _halves(solid: Manifold) -> list[Manifold]:
-    """Both sides of the plane through `solid` that leaves least empty in the hulls of what it parts; none if no plane cuts it."""
+def _halves(solid: Manifold, planes: list[Plane]) -> list[Manifold]:
+    """Both sides of the one of `planes` that leaves least empty in the hulls of what it parts; none if none cuts `solid`."""
     best: list[Manifold] = []
     least = np.inf
-    for normal, height in _planes(solid):
+    for normal, height in planes:
         halves = [half for half in solid.split_by_plane(normal, height) if half.volume() > SMALLEST]
         if len(halves) < 2:
             continue
@@ -221,11 +234,8 @@ def _halves(solid: Manifold) -> list[Manifold]:
     return best
 
 
-def _planes(solid: Manifold) -> list[tuple[Floats, float]]:
-    """Planes along which `solid` can be cut: those of faces that meet in a concave edge, the ones with the longest edges first.
-
-    Each has its unit normal, and its distance from the origin along that, m.
-    """
+def _planes(solid: Manifold) -> list[Plane]:
+    """Planes along which `solid` can be cut: those of faces that meet in a concave edge, the ones with the longest edges first."""
     vertices, faces = _triangles(solid)
     normals = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
     areas = np.linalg.norm(normals, axis=1)
@@ -270,12 +280,14 @@ def _triangles(solid: Manifold) -> Surface:
     return np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
 
 
-def _patches(parts: Iterable[Floats], most: int) -> list[Floats]:
+def _patches(parts: list[Floats], most: int) -> list[Floats]:
     """The corners (N, 3) m of patches of the triangles `parts` (M, 3, 3) m: the largest patch is halved until there are `most`."""
+    if not parts:
+        return []
+    triangles = np.concatenate(parts)
     numbers = count()
-    waiting = [(-_size(triangles), next(numbers), triangles) for triangles in parts]
-    heapq.heapify(waiting)
-    while waiting and len(waiting) < most and len(waiting[0][-1]) > 1:
+    waiting = [(-_size(triangles), next(numbers), triangles)]
+    while len(waiting) < most and len(waiting[0][-1]) > 1:
         triangles = heapq.heappop(waiting)[-1]
         middles = triangles.mean(axis=1)
         order = np.argsort(middles[:, np.ptp(middles, axis=0).argmax()], kind="stable")

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
 from ddenv.errors import UserError
 from ddenv.settings import Ignorable
+from ddenv.text import first_of
 from ddenv.world.access import MissingFiles, Unsupported
 from ddenv.world.files.resources import Resources, how_to_fetch
-from ddenv.world.model import Note
+from ddenv.world.model import Note, World
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.standin import ALL_MISSING, AUTO, StandIn, matching, parse_stand_ins
 from ddenv.world.sdf.xml import Element, complain, floats, parse, place
@@ -77,6 +78,10 @@ INSIDE = frozenset(
 )
 
 
+# A message names so many other files.
+MOST_NAMED = 5
+
+
 @dataclass
 class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
@@ -111,7 +116,7 @@ class Context:
         if fault is None:
             return
         file = "/".join(root.source.parts[-2:])
-        why = f"in {file}, line {fault.line}, column {fault.column}: {fault}; the file was read as Gazebo reads it"
+        why = f"in {file}, {fault}; the file was read as Gazebo reads it"
         self.notes.append(Note("ignored", self.model, place(root), "a fault of XML", why))
 
     def note_unused(self, root: Element) -> None:
@@ -119,6 +124,17 @@ class Context:
         # `auto` asks for nothing as long as nothing is missing.
         for uri in sorted(uri for uri, own in self.stand_ins.items() if own != AUTO and uri not in self.used):
             self.note("ignored", root, f"the stand-in for '{uri}' is not used: no model or mesh names it")
+
+    def recorded(self, world: World) -> World:
+        """`world`, with what was noted, found and guessed as it was read."""
+        return replace(
+            world,
+            notes=tuple(self.notes),
+            resources=self.resources.taken,
+            found=tuple(self.resources.found.values()),
+            absent=self.resources.absent(),
+            guessed=tuple(self.guessed),
+        )
 
     def complain_of_missing(self) -> None:
         """Raises MissingFiles with the first error, and the names of the other files."""
@@ -149,8 +165,7 @@ class Context:
 
 def _also(what: str, uris: Sequence[str]) -> str:
     """The end of a sentence that names other files."""
-    more = f" and {len(uris) - 5} more" if len(uris) > 5 else ""
-    return f"; {what}: {', '.join(repr(uri[:100]) for uri in uris[:5])}{more}" if uris else ""
+    return f"; {what}: {first_of([repr(uri[:100]) for uri in uris], MOST_NAMED)}" if uris else ""
 
 
 def sdf_root(text: bytes, path: Path) -> Element:
@@ -163,7 +178,7 @@ def sdf_root(text: bytes, path: Path) -> Element:
         raise complain(root, f"is a robot in URDF, and no world; {how_to_include(path)}")
     if root.tag != "sdf":
         raise complain(root, "expected <sdf> as the outermost element: is this an SDF file?")
-    given = (root.get("version") or "").strip()
+    given = root.get("version", "").strip()
     if given not in VERSIONS:
         said = f"version '{given[:20]}' is not supported" if given else "has no version attribute"
         raise complain(root, f"{said}; use SDF {VERSIONS[0]} to {VERSIONS[-1]}")

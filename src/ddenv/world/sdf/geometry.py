@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,20 +26,18 @@ from ddenv.world.write import primitive
 SIDES = 32  # of a cone
 SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline", "heightmap")
 SMALLEST, LARGEST = 1e-6, 1e6  # m
-# The sizes of a shape whose element gives none, m: those of libsdformat, by the element and its child.
-DEFAULT_SIZES: dict[tuple[str, str], tuple[float, ...]] = {
-    ("box", "size"): (1.0, 1.0, 1.0),
-    ("capsule", "radius"): (0.5,),
-    ("capsule", "length"): (1.0,),
-    ("cone", "radius"): (0.5,),
-    ("cone", "length"): (1.0,),
-    ("cylinder", "radius"): (1.0,),
-    ("cylinder", "length"): (1.0,),
-    ("ellipsoid", "radii"): (1.0, 1.0, 1.0),
-    ("heightmap", "size"): (1.0, 1.0, 1.0),
-    ("plane", "size"): (1.0, 1.0),
-    ("polyline", "height"): (1.0,),
-    ("sphere", "radius"): (1.0,),
+# The sizes of each shape, m, by the elements that say them: libsdformat takes these where one is
+# missing.
+DEFAULT_SIZES: dict[str, dict[str, tuple[float, ...]]] = {
+    "box": {"size": ONE},
+    "capsule": {"radius": (0.5,), "length": (1.0,)},
+    "cone": {"radius": (0.5,), "length": (1.0,)},
+    "cylinder": {"radius": (1.0,), "length": (1.0,)},
+    "ellipsoid": {"radii": ONE},
+    "heightmap": {"size": ONE},
+    "plane": {"size": (1.0, 1.0)},
+    "polyline": {"height": (1.0,)},
+    "sphere": {"radius": (1.0,)},
 }
 # The maximum number of convex pieces of one mesh, and that of libsdformat for <convex_decomposition> without a number.
 MOST_PIECES = 512
@@ -95,23 +94,23 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
             context.note("ignored", element, why)
             return None
         case "plane":
-            length, width = _sizes(element, "size")
-            return Placed(Plane((length, width)), _turned(element.find("normal")))
+            return Placed(Plane(*_sizes(element)), _turned(element.find("normal")))
     return Placed(_scaled(_primitive(element), scale, element))
 
 
 def _primitive(element: Element) -> Shape:
-    match element.tag:
-        case "box":
-            return Box(vector(_sizes(element, "size")))
-        case "ellipsoid":
-            return Ellipsoid(vector(_sizes(element, "radii")))
-        case "sphere":
-            return Sphere(*_sizes(element, "radius"))
-        case "cylinder" | "capsule" | "cone" as tag:
-            kinds: dict[str, Callable[[float, float], Shape]] = {"cylinder": Cylinder, "capsule": Capsule, "cone": cone}
-            return kinds[tag](*_sizes(element, "radius"), *_sizes(element, "length"))
-    raise complain(element, f"<{element.tag}> is not a known shape; use one of {', '.join(SHAPES)}")
+    kinds: dict[str, Callable[..., Shape]] = {
+        "box": Box,
+        "capsule": Capsule,
+        "cone": cone,
+        "cylinder": Cylinder,
+        "ellipsoid": Ellipsoid,
+        "sphere": Sphere,
+    }
+    if element.tag not in kinds:
+        known = ", ".join(SHAPES)
+        raise complain(element, f"<{element.tag}> is not a known shape; use one of {known}")
+    return kinds[element.tag](*_sizes(element))
 
 
 def _turned(normal: Element | None) -> Pose:
@@ -165,7 +164,7 @@ def _terrain(element: Element, context: Context, scale: Vector) -> Placed:
     uri = text_of(element.find("uri"))
     if not uri:
         raise complain(element, "has no <uri>")
-    size = _times(vector(_sizes(element, "size")), scale)
+    size = _times(vector(*_sizes(element)), scale)
     place = element.find("pos")
     try:
         shares = context.resources.heights(MeshPart(uri, element.source.parent))
@@ -282,27 +281,25 @@ def _check_sizes(sizes: Sequence[float], element: Element) -> None:
 
 
 def _times(vector: Vector, scale: Vector) -> Vector:
-    if scale == ONE:
-        return vector
     return (vector[0] * scale[0], vector[1] * scale[1], vector[2] * scale[2])
 
 
-def _sizes(shape: Element, tag: str) -> tuple[float, ...]:
-    """The sizes in the child `tag` of a shape, m. Raises UserError."""
-    usual = DEFAULT_SIZES[shape.tag, tag]
-    element = shape.find(tag)
-    if element is None:
-        return usual
-    values = numbers(element, len(usual))
-    if min(values) < SMALLEST or max(values) > LARGEST:
-        raise complain(element, f"{RANGE}, found '{text_of(element)[:60]}'")
-    return values
+def _sizes(shape: Element) -> list[Any]:
+    """The sizes of a shape, m, as in DEFAULT_SIZES: numbers, or vectors. Raises UserError."""
+    sizes: list[Any] = []
+    for tag, usual in DEFAULT_SIZES[shape.tag].items():
+        element = shape.find(tag)
+        values = usual if element is None else numbers(element, len(usual))
+        if element is not None and (min(values) < SMALLEST or max(values) > LARGEST):
+            raise complain(element, f"{RANGE}, found '{text_of(element)[:60]}'")
+        sizes.append(values[0] if len(values) == 1 else values)
+    return sizes
 
 
 def _polyline(geometry: Element, scale: Vector) -> Placed:
     """All `<polyline>`s of a `<geometry>`, extruded upwards from z = 0; what lies in two of them is a hole. Raises UserError."""
     elements = geometry.findall("polyline")
-    height = _sizes(elements[0], "height")[0]
+    (height,) = _sizes(elements[0])
     outlines = [np.array([numbers(point, 2) for point in element.findall("point")]) for element in elements]
     corners = convex_hull(np.vstack([outline.reshape(-1, 2) for outline in outlines]))
     if len(corners) < 3:

@@ -64,7 +64,7 @@ def _links(element: Element, prefix: str = "") -> Iterator[tuple[str, Element]]:
     """The links in a `<model>` and in those nested in it, by the names that `Model.links` has."""
     for child in element:
         if child.tag == "link":
-            yield prefix + (child.get("name") or ""), child
+            yield prefix + child.get("name", ""), child
         elif child.tag == "model":
             yield from _links(child, f"{prefix}{child.get('name')}::")
 

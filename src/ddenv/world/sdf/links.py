@@ -54,7 +54,7 @@ GAZEBO_COLORS: dict[str, tuple[float, float, float]] = {
 }
 
 
-def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local: Pose, *, moving: bool) -> Link:
+def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local: Pose) -> Link:
     """The link of `element` in the model at `spot`, with its `pose` in the world, and `local` in its model. Raises UserError."""
     note_unread(element, context)
     items = []
@@ -73,9 +73,9 @@ def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local:
             solids = _collisions(item, placed, pose, context)
             collisions += solids
             density += [read_density(item.element, usual)] * len(solids)
-    inertia = read_inertia(element, pose, collisions, density, context) if moving else None
+    inertia = None if spot.static else read_inertia(element, pose, collisions, density, context)
     kinematic = element.find("kinematic")
-    if kinematic is not None and moving and truth(element, "kinematic", False):
+    if kinematic is not None and not spot.static and truth(element, "kinematic", False):
         context.note("ignored", kinematic, "forces move it like any other link")
     for item in items:
         if isinstance(item.shape, Lost) and item.element.tag == "visual":
@@ -213,7 +213,7 @@ def read_color(visual: Element) -> Color | None:
     for tag in ("material/diffuse", "material/ambient"):
         element = visual.find(tag)
         if element is not None and text_of(element):
-            count = 4 if len((element.text or "").split()) == 4 else 3
+            count = 4 if len(text_of(element).split()) == 4 else 3
             red, green, blue, *alpha = (min(max(value, 0.0), 1.0) for value in numbers(element, count))
             # Many files have colours with an alpha of zero, which the simulators that wrote them ignored.
             return red, green, blue, ((alpha or [1.0])[0] or 1.0) * opacity

@@ -106,13 +106,9 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         gravity=GRAVITY if gravity is None else vector(numbers(gravity, 3)),
         models=models,
         version=root.get("version") or "",
-        notes=tuple(context.notes),
         anchors=frozenset(model.name for model in models if model.name in anchors or model.spans[0][0] in copied),
-        resources=context.resources.taken,
-        found=tuple(context.resources.found.values()),
-        absent=context.resources.absent(),
-        guessed=tuple(context.guessed),
     )
+    whole = context.recorded(whole)
     return _opened(whole, root, scope, context) if context.reading.inside else whole
 
 
