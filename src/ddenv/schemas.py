@@ -10,9 +10,10 @@ import ast
 import difflib
 import importlib.util
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from functools import cache
 from importlib.machinery import PathFinder
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -130,9 +131,14 @@ def _source(module: str) -> Path:
     return Path(spec.origin)
 
 
-def nearest(word: str, known: Sequence[str]) -> str:
+# Words are compared by so many characters, and with so many known ones: more would take seconds.
+LONGEST_COMPARED, MOST_COMPARED = 80, 1000
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
     """ " (did you mean ...?)" with the known word nearest to `word`, or ""."""
-    match = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    words = [each[:LONGEST_COMPARED] for each in islice(known, MOST_COMPARED)]
+    match = difflib.get_close_matches(word[:LONGEST_COMPARED], words, n=1, cutoff=0.5)
     return f" (did you mean {match[0]}?)" if match else ""
 
 

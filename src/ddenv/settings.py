@@ -18,8 +18,11 @@ Value = int | float | str | bool | None
 FARTHEST, TURNS = 1e6, 1e3
 
 # Kinds of elements that the user can have skipped instead of refusing the world.
-Ignorable = Literal["heightmap", "image", "mesh", "include", "joint"]
+Ignorable = Literal["heightmap", "image", "mesh", "include", "joint", "population"]
 IGNORABLE: tuple[str, ...] = get_args(Ignorable)
+# What collides in place of a mesh that is not convex.
+MeshReading = Literal["pieces", "hull"]
+MESH_READINGS: tuple[str, ...] = get_args(MeshReading)
 
 # Where a setting shows. "method" is chosen by schemas, "basic" and "more" are fields of the setup form, and all three are options
 # of the command line, as "option" is. "scenario" is in scenario files (and in `ddenv.reduce`) alone.

@@ -342,12 +342,18 @@ def test_a_file_or_a_run_alone_opens_the_workbench_on_it(home, monkeypatch, firs
 def test_options_for_reading_stand_before_the_file_or_after_it(home, monkeypatch, command):
     opened, fetched = [], []
     monkeypatch.setattr("ddenv.workbench.launch.run_workbench", lambda *_, reading, **__: opened.append(reading) or 0)
-    monkeypatch.setattr("ddenv.cli.fetch.fetch_with_bar", lambda world, reading: fetched.append((world, reading)))
+    monkeypatch.setattr("ddenv.cli.fetch.fetch_with_bar", lambda world, reading, _: fetched.append((world, reading)))
     world = DATA / "wall.sdf"
-    before = ["--fetch", "--inside", "--stand-in", "a=none", "--model-path", home]
+    before = ["--fetch", "--inside", "--mesh", "hull", "--stand-in", "a=none", "--model-path", home]
     assert command(*before, world, "--stand-in", "b=auto", "--ignore", "joint").returncode == 0
     (asked,) = opened
-    assert asked == {"stand_in": ("a=none", "b=auto"), "model_path": (home,), "ignore": ("joint",), "inside": True}
+    assert asked == {
+        "stand_in": ("a=none", "b=auto"),
+        "model_path": (home,),
+        "ignore": ("joint",),
+        "inside": True,
+        "mesh": "hull",
+    }
     assert [(file, reading.inside) for file, reading in fetched] == [(world, True)]
     assert command("--inside").returncode == 0 and opened[1]["inside"]
     is_one_line(command("--fetch"), "--fetch: name the world that lacks models")

@@ -18,6 +18,9 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 
+from ddenv.cli.fetch import fetch_with_bar
+from ddenv.errors import UserError
+from ddenv.runs.subject import load_parts, scenario_for_world, scenario_named
 from ddenv.world.files import fuel_download
 from ddenv.world.files.fuel import CACHES, HOSTS
 from ddenv.world.files.roots import VARIABLES
@@ -169,6 +172,28 @@ def test_models_come_with_those_that_they_name_and_gazebo_finds_them_too(fuel, c
     assert not any(path.stat().st_mode & 0o111 for path in cache.rglob("*") if path.is_file())
     assert check(uri, fetch=False).returncode == 0 and check(uri).returncode == 0
     assert len(fuel.asked) == 2
+
+
+def test_models_that_a_robot_names_come_too(fuel, cache, tmp_path):
+    wheel = f"<mesh><uri>{FUEL}/Some%20One/models/Wheel/tip/files/wheel.obj</uri></mesh>"
+    robot = tmp_path / "robot.sdf"
+    shape = f"<collision name='c'><geometry>{wheel}</geometry></collision>"
+    robot.write_text(f"<sdf version='1.6'><model name='robot'><link name='l'>{shape}</link></model></sdf>")
+    world = tmp_path / "w.sdf"
+    world.write_text(
+        f"<sdf version='1.6'><world name='w'>{CRATE.partition('>')[2].removesuffix('</sdf>')}</world></sdf>"
+    )
+    fuel.has("Wheel", packed({"model.sdf": CRATE, "wheel.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3 4\n"}))
+    scenario = scenario_for_world(world, (0, 9, 1, 0), (9, 9)).model_dump(mode="json")
+    scenario["robot"]["model"] = str(robot)
+    file = tmp_path / "s.yaml"
+    file.write_text(json.dumps(scenario))
+    given = {"spawn": None, "goal": None, "world": None}
+    with pytest.raises(UserError, match="this model from Fuel"):
+        load_parts(scenario_named(str(file), given))
+    _, found = load_parts(scenario_named(str(file), given | {"fetch": fetch_with_bar}))
+    assert len(found.collisions) > 0
+    assert len(fuel.asked) == 1 and (cache / HOSTS[0] / "some one" / "models" / "wheel" / "1" / "wheel.obj").is_file()
 
 
 def files_in_both(models: Path, cache: Path) -> list[str]:

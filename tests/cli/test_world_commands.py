@@ -58,10 +58,10 @@ def test_models_that_must_stay_are_named(tmp_path):
 
     assert lines(world_of(tmp_path, box("a")))[-1].startswith("1 model, 1 can be removed; ")
     one = lines(world_of(tmp_path, box("a"), following("a")))[-1]
-    assert one.startswith("2 models, 1 can be removed; 1 stays because others are placed relative to it: a; ")
+    assert one.startswith("2 models, 1 can be removed; 1 stays because others depend on it: a; ")
     many = [part for name in "abcdefg" for part in (box(name), following(name))]
     told = lines(world_of(tmp_path, *many))[-1]
-    assert "; 7 stay because others are placed relative to them: a, b, c, d, e and 2 more; " in told
+    assert "; 7 stay because others depend on them: a, b, c, d, e and 2 more; " in told
 
 
 STATE = "".join(

@@ -33,7 +33,8 @@ from ddenv.world.pose import Pose
 from ddenv.world.scenario import Oracle
 from ddenv.world.sdf.read import read_model
 from tests.conftest import ROOT
-from tests.robot.drake.test_floors import EDGE, ROAD, piece, platform
+from tests.robot.drake.conftest import EDGE, ROAD, piece
+from tests.robot.drake.test_floors import platform
 
 FOLDER = ROOT / "docs/examples/mujoco"
 needs_mujoco = pytest.mark.skipif(find_spec("mujoco") is None, reason="mujoco is not installed: pip install mujoco")

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.map.footprints import DYNAMIC, ROUND, STATIC, footprint, plan
+from ddenv.map.drawing import Frame, path_of
+from ddenv.map.footprints import DYNAMIC, ROUND, STATIC, footprint, footprints, plan
 from ddenv.world.extent import polygon_area, shape_bounds
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Link, Mesh, Model, Plane, Shape, Sphere
 from ddenv.world.pose import Pose
@@ -86,10 +87,45 @@ def test_of_models_of_one_height_the_larger_is_drawn_first():
 
 def test_a_huge_model_hides_nothing_wherever_it_is():
     crates = [box(f"crate {number}", number, 0) for number in range(5)]
-    first, *others = drawn(*crates, box("roof", 0, 0, size=(20, 20, 0.1), z=4))
-    assert first.model.name == "roof"
+    first, *others = drawn(*crates, box("stage", 0, 0, size=(20, 20, 0.1), z=0.8))
+    assert first.model.name == "stage"
     assert first.floor
     assert not any(each.floor for each in others)
+
+
+def house(*walls: str) -> str:
+    """A model of boxes, each given as "x y z size"."""
+    boxes = (
+        f"<collision name='{number}'><pose>{' '.join(wall.split()[:3])} 0 0 0</pose>"
+        f"<geometry><box><size>{' '.join(wall.split()[3:])}</size></box></geometry></collision>"
+        for number, wall in enumerate(walls)
+    )
+    return f"<model name='house'><static>1</static><link name='l'>{''.join(boxes)}</link></model>"
+
+
+HOUSE = house(
+    "-3 0 1 0.2 6 2", "3 0 1 0.2 6 2", "0 3 1 6 0.2 2", "-2 -3 1 2 0.2 2", "2 -3 1 2 0.2 2", "0 -3 1.8 2 0.2 0.4"
+)
+
+
+def test_a_building_is_its_walls_with_its_doors_open_and_what_hangs_is_a_point():
+    floor, lamp = box("floor", 0, 0, size=(6, 6, 0.1)), box("lamp", 0, 0, z=1.5)
+    crates = [box(f"crate {number}", number / 4, 0, size=(0.3, 0.3, 0.3)) for number in range(5)]
+    models = {each.model.name: each for each in drawn(HOUSE, floor, lamp, *crates)}
+    walls = models["house"]
+    assert not walls.floor and models["floor"].floor
+    assert walls.outline.distance((0.0, 0.0)) == pytest.approx(2.9)
+    # Below the lintel.
+    assert walls.outline.distance((0.0, -3.0)) == pytest.approx(1.0)
+    assert models["lamp"].outline.polygons == ()
+    assert models["lamp"].size == pytest.approx((1.2, 0.8, 0.3))
+    # Above a trench the ground is what is beside it.
+    raised = {each.model.name: each for each in drawn(box("quay", 0, 0, size=(6, 6, 2)), box("tile", 0, 0, z=2))}
+    assert raised["tile"].outline.polygons
+    # One outline around it would close it.
+    frame = Frame.around(list(models.values()), [], 0.1, 2.0, (800.0, 600.0), (0.0, 0.0), (0.0, 0.0))
+    assert path_of(walls, frame, coarse=True) == path_of(walls, frame)
+    assert [each.name for each in footprints(world_of(GROUND, HOUSE, floor))] == ["floor", "house"]
 
 
 def test_of_few_models_none_is_a_floor():

@@ -26,6 +26,7 @@ from ddenv.world.model import (
     Plane,
     Shape,
     Sphere,
+    Terrain,
     World,
 )
 from ddenv.world.placement import (
@@ -43,7 +44,7 @@ from ddenv.world.placement import (
     overlap,
 )
 from ddenv.world.pose import Pose
-from ddenv.world.scenario import Spawn
+from ddenv.world.scenario import Goal, Spawn
 from ddenv.world.sdf.read import parse_world, read_model, read_world
 from tests.conftest import DATA
 from tests.robot.conftest import GROUND, box_model
@@ -178,6 +179,20 @@ def test_a_slope_is_below_the_robot_where_it_goes_down():
         check_spawn(slope, HUSKY, Spawn(x=-5, y=0, z=0.2))
 
 
+def test_the_start_on_terrain_is_at_its_height():
+    slope = Terrain((20.0, 20.0), np.broadcast_to(np.linspace(0.0, 4.0, 11), (11, 11)), "slope")
+    hill = world_with(slope, Pose((0.0, 0.0, 1.0)))
+    with pytest.raises(UserError, match=r"inside model 'thing' by .*free nearby: ") as caught:
+        check_spawn(hill, HUSKY, Spawn(x=0, y=0, z=0.2))
+    free = Spawn(**dict(zip("xyz", map(float, str(caught.value).partition("--spawn=")[2].split(",")), strict=False)))
+    check_spawn(hill, HUSKY, free)
+    assert (free.x, free.y) == (0, 0)
+    assert drop(hill, HUSKY, free) < 0.03
+    assert drop(hill, HUSKY, free.model_copy(update={"z": free.z + 1})) == pytest.approx(1.0, abs=0.03)
+    # Beyond its edge there is nothing.
+    assert drop(hill, HUSKY, Spawn(x=15, y=0, z=9)) == 0.0
+
+
 def test_a_robot_without_shapes_cannot_start():
     ghost = Model("ghost", Pose(), False, (Link("l", Pose(), None, (), ()),), (), (), 1)
     with pytest.raises(UserError, match="'ghost' has no collision shapes"):
@@ -247,8 +262,8 @@ def test_wheels_in_the_air_and_a_world_that_pulls_nothing_down_are_noted():
 
 def test_a_goal_inside_a_post_is_noted():
     start = Spawn(x=0, y=0, z=0.45)
-    assert [about for about, _ in notes_on_start(WALL, HUSKY, start, (0.0, -4.0))] == ["goal"]
-    assert list(notes_on_start(WALL, HUSKY, start, (0.0, -3.0))) == []
+    assert [about for about, _ in notes_on_start(WALL, HUSKY, start, Goal(x=0, y=-4))] == ["goal", "passage"]
+    assert list(notes_on_start(WALL, HUSKY, start, Goal(x=0, y=-3))) == []
 
 
 @pytest.mark.parametrize(
@@ -295,3 +310,13 @@ def test_what_can_be_hit_where_nothing_is_seen_is_named():
     ]
     assert list(note_unseen(seen_as(0.05), ("post",))) == []
     assert "models without a visual, which can be hit but not seen: odd" in world_lines(seen_as())
+
+
+@pytest.mark.parametrize(("height", "named"), [(1.0, ["sheet"]), (0.01, [])])
+def test_what_is_seen_and_cannot_be_hit_is_named_unless_it_is_flat(height, named):
+    drawn = f"<visual name='v'><geometry><box><size>1 1 {height}</size></box></geometry></visual>"
+    sheet = f"<model name='sheet'><static>1</static><link name='l'>{drawn}</link></model>"
+    text = seen_as(1.0).text.replace(b"</world>", f"{sheet}</world>".encode())
+    notes = list(note_unseen(parse_world(text, Path("w.sdf")), ("post", "odd", "sheet")))
+    words = "models without a collision, which can be seen but not hit"
+    assert notes == [("passable", f"{words}: {name}") for name in named]

@@ -152,9 +152,28 @@ def on_frame_a(*others: str) -> bytes:
     return world(f"{''.join(others)}<model name='m'><pose relative_to='a'>0 0 0 0 0 0</pose>{LINK}</model>")
 
 
+def populated(distribution: str, more: str = "") -> bytes:
+    inside = f"<model name='k'>{LINK}</model><distribution>{distribution}</distribution>{more}"
+    return world(f"<population>{inside}</population>")
+
+
 # These point at the element.
 AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
-    "`<population>`": {"<population> is not supported; write its models out": [world("<population name='p'/>")]},
+    "a `<population>` whose": {
+        "only Gazebo Classic knows the places of a 'uniform' distribution; .* --ignore population": [
+            populated("<type>uniform</type>")
+        ],
+        "/population: has no distribution/step": [populated("<type>grid</type><rows>1</rows><cols>1</cols>")],
+        r"/step: must be between -1e\+06 and 1e\+06 m": [
+            populated("<type>grid</type><rows>3</rows><cols>3</cols><step>1e308 1e308 1</step>")
+        ],
+        r"/size: must be between 0 and 1e\+06 m": [
+            populated("<type>linear-x</type>", "<model_count>2</model_count><box><size>1 -1 1</size></box>")
+        ],
+        "/population: must stand for 1 to 50000 models; see its rows and cols, or model_count": [
+            populated(f"<type>grid</type><rows>1</rows>{cols}") for cols in ("", "<cols>0</cols>", "<cols>1e9</cols>")
+        ],
+    },
     "`<joint>` between models": {"joints between models are not supported": [world("<joint name='j' type='fixed'/>")]},
     "a second `<state>`": {
         "/state: a second <state>; a world may have only one": [world("<state/><state/>")],
@@ -292,12 +311,16 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
         ],
     },
     "a collision `<heightmap>`": {
-        "/geometry/heightmap: a heightmap is not supported.*--ignore heightmap": [
+        "/geometry/heightmap: heightmap 'h.png' is not available: .*--ignore heightmap": [
             shape("<heightmap><uri>h.png</uri></heightmap>")
-        ]
+        ],
+        "/heightmap: has no <uri>": [shape("<heightmap/>")],
+        r"/heightmap/size: sizes must be from 1e-06 to 1e\+06 m, found '9 0 1'": [
+            shape("<heightmap><uri>h.png</uri><size>9 0 1</size></heightmap>")
+        ],
     },
     "a collision `<image>`": {
-        "/geometry/image: a image is not supported.*--ignore image": [shape("<image><uri>x.png</uri></image>")]
+        "/geometry/image: an image is not supported.*--ignore image": [shape("<image><uri>x.png</uri></image>")]
     },
     "friction or damping": {
         "/mu: friction must not be negative, found -1": [surface("<friction><ode><mu>-1</mu></ode></friction>")],

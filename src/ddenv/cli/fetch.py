@@ -1,4 +1,4 @@
-"""Downloads the models that a world lacks, with a bar for each on the terminal: `--fetch`."""
+"""Downloads the models that a world or a robot lacks, with a bar for each on the terminal: `--fetch`."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from ddenv.cli.terminal import announce
 from ddenv.text import printable
 
 if TYPE_CHECKING:
+    from ddenv.runs.subject import Parse
     from ddenv.world.files.fuel import FuelModel
     from ddenv.world.files.fuel_download import Shown
     from ddenv.world.scenario import Reading
 
+LEAVE_OUT = "leave it out with --stand-in {}"
 
-def fetch_with_bar(world: Path, reading: Reading) -> None:
-    """Downloads the models in Fuel that `world` lacks. Raises UserError."""
+
+def fetch_with_bar(file: Path, reading: Reading, parse: Parse) -> None:
+    """Downloads the models in Fuel that `file` lacks, which `parse` reads. Raises UserError."""
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TransferSpeedColumn
@@ -31,4 +34,4 @@ def fetch_with_bar(world: Path, reading: Reading) -> None:
             bar = bars.add_task(escape(printable(model.name)), total=None)
             return lambda received, total: bars.update(bar, completed=received, total=total)
 
-        fetch_missing(world, reading, bar_of, announce)
+        fetch_missing(file, reading, parse, show=bar_of, tell=announce, advice=LEAVE_OUT)

@@ -12,7 +12,7 @@ from click.shell_completion import CompletionItem
 
 from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX, runs_folder
-from ddenv.settings import FARTHEST, IGNORABLE, JOBS, OPTIONS, SETTINGS, Setting
+from ddenv.settings import FARTHEST, IGNORABLE, JOBS, MESH_READINGS, OPTIONS, SETTINGS, Setting
 
 # Endings of files that a command can open.
 OPENED = (".ddenv", ".yaml", ".yml", ".sdf", ".world", ".urdf")
@@ -175,6 +175,11 @@ reading_options = together(
         is_flag=True,
         default=None,
         help="Remove single parts of models that never move, such as the walls of a house, instead of whole models.",
+    ),
+    click.option(
+        "--mesh",
+        type=click.Choice(MESH_READINGS),
+        help="What collides in place of a mesh that is not convex: its convex pieces, or its hull.  [default: pieces]",
     ),
 )
 

@@ -59,8 +59,10 @@ def open_command(before: Mapping[str, Any], /, run: str, watch: bool, lines: boo
     fetch: Fetch | None = reading.pop("fetch")
     given = given_reading(reading)
     if fetch is not None:
+        from ddenv.world.sdf.read import parse_world
+
         world, own = world_of(path)
-        fetch(world, reading_of(own, **given))
+        fetch(world, reading_of(own, **given), parse_world)
     return run_workbench(None, reading=given, file=path.absolute())
 
 

@@ -9,6 +9,7 @@ import shutil
 import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,14 +53,14 @@ def world_command() -> None:
 def _read(file: Path, options: Data) -> tuple[World, Reading]:
     """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
     from ddenv.runs.subject import reading_of, with_remembered, world_of
-    from ddenv.world.sdf.read import read_world
+    from ddenv.world.sdf.read import parse_world, read_world
 
     file, own = world_of(file)
     fetch: Fetch | None = options.pop("fetch")
     reads_remembered = options.pop("remembered")
     read_as = reading_of(own, **options)
     if fetch is not None:
-        fetch(file, read_as)
+        fetch(file, read_as, parse_world)
     if reads_remembered:
         read_as = with_remembered(file, read_as, announce)
     return read_world(file, read_as), read_as
@@ -81,6 +82,7 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 def world_report(world: World) -> Data:
     """Everything of the table and more; lengths in m, angles in rad."""
     from ddenv.world.extent import model_bounds
+    from ddenv.world.files.floor_error import floor_errors
     from ddenv.world.placement import inside
     from ddenv.world.sdf.official import refused
 
@@ -113,6 +115,7 @@ def world_report(world: World) -> Data:
         "models": models,
         "notes": _notes(world, *({note.model for note in world.notes} - {model.name for model in world.models})),
         "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
+        "pieces": [asdict(error) for error in floor_errors(world.models)],
         "refused": [{"why": why, "place": place} for why, place in refused(world)],
         "files": [{"uri": file.uri, "path": str(file.path), "from": file.source} for file in world.found],
         "absent": list(world.absent),
@@ -144,6 +147,7 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
 
     No line is wider than `columns`: first some columns go, then cells have more lines, or less words.
     """
+    from ddenv.world.files.floor_error import note_pieces
     from ddenv.world.placement import note_inside, note_unseen
     from ddenv.world.sdf.official import refused
 
@@ -162,7 +166,7 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
     places: dict[str, list[str]] = {}
     for why, place in refused(world):
         places.setdefault(why, []).append(place)
-    remarks = (*note_inside(world), *note_unseen(world, world.elements()))
+    remarks = (*note_inside(world), *note_unseen(world, world.elements()), *note_pieces(world, world.names))
     wrong = [words for _, words in remarks]
     for why, at in places.items():
         more = f", and {len(at) - 1} more" if len(at) > 1 else ""
@@ -256,7 +260,7 @@ def _totals(world: World) -> str:
     said = [f"{kinds[kind]} {kind}" for kind in ("replaced", "ignored") if kinds[kind]]
     stay = [shortened(model.name, LONGEST_NAME) for model in world.models if model.name in world.anchors]
     they, them = ("1 stays", "it") if len(stay) == 1 else (f"{len(stay)} stay", "them")
-    why = f"; {they} because others are placed relative to {them}: {first_of(stay, MOST_NAMES)}" if stay else ""
+    why = f"; {they} because others depend on {them}: {first_of(stay, MOST_NAMES)}" if stay else ""
     welds = [f"{shortened(one, LONGEST_NAME)} to {shortened(other, LONGEST_NAME)}" for one, other in world.ties]
     why += f"; welded, so they are removed together: {first_of(welds, MOST_NAMES)}" if welds else ""
     models = f"{count(len(world.models), 'model')}, {len(world.elements())} can be removed{why}"
@@ -390,6 +394,6 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
     far = f", {farthest} farthest, by {ways[farthest]:.3f} m" if farthest else ""
     print(printable(f"wrote {output}: {count(len(ways), 'model')} moved within {settled.seconds:.1f} s{far}"))
     if stay:
-        why = "their parts move, or others are placed relative to them"
+        why = "their parts move, or others depend on them"
         print(printable(f"not moved: {first_of(stay, MOST_NAMES)}: {why}"))
     return 0

@@ -54,20 +54,24 @@ def terminal_map(
     low, high = low - margin, high + margin
     entries = []
     for sign, each in sorted(zip(signs(models), models, strict=True), key=lambda each: -each[1].outline.area):
-        (x, y, _), size = each.center, " x ".join(f"{part:.2f}" for part in each.size)
-        if each.model.name not in dim:
-            size = size if each.outline.polygons else "no shapes"
-            entries.append((sign, each.model.name, f"{x:.2f}, {y:.2f}", size))
+        if each.model.name in dim:
+            continue
+        x, y, _ = each.center
+        size = "no shapes"
+        if any(each.size):
+            size = " x ".join(f"{part:.2f}" for part in each.size)
+        entries.append((sign, each.model.name, f"{x:.2f}, {y:.2f}", size))
     legend = _legend(entries, columns, max(3, rows // 3))
     view = _view(low, high, columns - AXIS, rows - AROUND - len(legend))
     canvas = picture(models, view, color=color, dim=dim)
+    fore = WHITE if color else PLAIN
     title = [world.path.name, count(len(models), "model")]
     if spawn is not None:
         title.append(f"S start ({spawn[0]:g}, {spawn[1]:g}), yaw {spawn[2]:g}")
-        canvas.put(view.cell(*spawn[:2]), f"S{arrow(spawn[2])}", *((WHITE, START) if color else (PLAIN, None)))
+        canvas.put(view.cell(*spawn[:2]), f"S{arrow(spawn[2])}", fore, START if color else None)
     if goal is not None:
         title.append(f"G goal ({goal[0]:g}, {goal[1]:g})")
-        canvas.put(view.cell(*goal), "G", *((WHITE, GOAL) if color else (PLAIN, None)))
+        canvas.put(view.cell(*goal), "G", fore, GOAL if color else None)
     return "\n".join([shortened(" · ".join(title), columns), *_framed(canvas, view, color), *legend])
 
 
@@ -113,13 +117,10 @@ def _framed(canvas: Canvas, view: View, color: bool) -> Iterator[str]:
     """The lines of the picture with its frame and its axes; all are equally wide."""
     wide, high = view.columns * view.scale / 2, view.rows * view.scale
     x_step, y_step = tick_step(2 * wide, max(1, view.columns // 8)), tick_step(2 * high, max(1, view.rows // 4))
-    across, down = dict[int, str](), dict[int, str]()
-    for x in ticks(view.x - wide, view.x + wide, x_step):
-        if cell := view.cell(x, view.y):
-            across[cell[1]] = tick_text(x, x_step)
-    for y in ticks(view.y - high, view.y + high, y_step):
-        if cell := view.cell(view.x, y):
-            down[cell[0]] = tick_text(y, y_step)
+    x_ticks = ticks(view.x - wide, view.x + wide, x_step)
+    y_ticks = ticks(view.y - high, view.y + high, y_step)
+    across = {cell[1]: tick_text(x, x_step) for x in x_ticks if (cell := view.cell(x, view.y))}
+    down = {cell[0]: tick_text(y, y_step) for y in y_ticks if (cell := view.cell(view.x, y))}
     yield f"{'y, m':>{NUMBERS}}┌{'─' * view.columns}┐"
     for row in range(view.rows):
         number, corner = (down[row], "┤") if row in down else ("", "│")

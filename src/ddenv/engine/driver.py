@@ -42,6 +42,7 @@ from ddenv.runs.tests_left import search_tests
 from ddenv.schemas import split_pair
 from ddenv.text import count
 from ddenv.words.claims import verdict_on
+from ddenv.world.files.floor_error import note_pieces
 from ddenv.world.model import World
 from ddenv.world.placement import note_unseen
 from ddenv.world.scenario import Reduction, Scenario
@@ -560,7 +561,8 @@ class Driver:
 
     def _end(self, minimal: bool, reason: str) -> None:
         self._bench.finish_trials()
-        for about, words in note_unseen(self._world, self._journal.state.environment):
+        left = self._journal.state.environment
+        for about, words in (*note_unseen(self._world, left), *note_pieces(self._world, left)):
             note(self._journal, about, f"what is left has {words}")
         # Tests of later candidates are no longer needed.
         self._journal.lose_running()

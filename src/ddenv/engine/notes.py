@@ -43,7 +43,7 @@ def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal)
     spawn = scenario.robot.spawn
     goal = scenario.goal
     epsilon = scenario.failure.epsilon
-    for about, words in notes_on_start(world, robot, spawn, (goal.x, goal.y)):
+    for about, words in notes_on_start(world, robot, spawn, goal):
         note(journal, about, words)
     for about, words in note_floor(world, robot, spawn, journal.state.elements):
         note(journal, about, words)

@@ -22,7 +22,8 @@ SIGNS = "ABCDEFHJKLMNPQRTUVWXYZabcdefghijkmnopqrstuvwxyz23456789"
 NO_SIGN, FLOORS, FAINT_SIGN = "+", ".:", "░"
 HALF_TOP, HALF_BOTTOM, FULL = "▀", "▄", "█"
 GREY: RGB = (120, 120, 124)
-FAINT, DIM = packed(GREY), packed((70, 70, 74))
+SHADE: RGB = (70, 70, 74)
+FAINT, DIM = packed(GREY), packed(SHADE)
 # Limits of brightness (mean of red, green and blue, 0..255) for visibility on all terminals.
 DARKEST, BRIGHTEST = 60.0, 225.0
 
@@ -117,9 +118,9 @@ def picture(models: Sequence[Drawn], view: View, *, color: bool, dim: Collection
 
 
 def _fill(each: Drawn, index: int) -> int:
-    """Floors are greyish, and models drawn one after the other differ."""
+    """Floors are dark and greyish, and models drawn one after the other differ."""
     if each.floor:
-        return packed(_visible(blend(each.color, GREY, 0.6)))
+        return packed(_visible(blend(each.color, SHADE, 0.7)))
     return packed(_visible(blend(each.color, (0, 0, 0), 0.14 * (index % 2))))
 
 

@@ -152,12 +152,12 @@ def badge(name: str, letter: str) -> str:
 
 
 def path_of(each: Drawn, frame: Frame, coarse: bool = False) -> str:
-    """The path of a model's polygons, or with `coarse` of one outline around them; a model without shapes is a small cross."""
+    """The path of a model's polygons; with none it is a small cross. With `coarse` it is one outline around what is not hollow."""
     polygons = each.outline.polygons
     if not polygons:
         x, y = frame.pixel(each.outline.center)
         return f"M{x - CROSS:.1f} {y - CROSS:.1f}l8 8m0 -8l-8 8"
-    shapes = [convex_hull(np.vstack(polygons))] if coarse else polygons
+    shapes = [convex_hull(np.vstack(polygons))] if coarse and not each.outline.hollow else polygons
     corners = (frame.pixels(shape) for shape in shapes)
     return "".join("M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in shape) + "Z" for shape in corners)
 

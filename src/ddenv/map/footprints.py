@@ -8,17 +8,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.map.colors import RGB
-from ddenv.world.extent import circle, convex_hull, model_bounds, vertices_of
-from ddenv.world.model import Model, Plane, World, is_ground
+from ddenv.world.extent import circle, convex_hull, filled_bounds, model_bounds, polygon_area, shape_bounds, vertices_of
+from ddenv.world.model import Box, Ground, Model, Plane, World, is_ground
 from ddenv.world.pose import HERE, Point, Pose, Vector, vector
 
 # Corners of the polygon that stands for a circle on a character map.
 ROUND = 12
 STATIC: RGB = (150, 156, 166)
 DYNAMIC: RGB = (205, 140, 70)
-# A model is a floor (or a roof) if its area is `FLOOR_FACTOR` times the median, and at least `FLOOR_AREA`.
+# A colour of which all parts are larger would not be seen on paper.
+WHITE = 0.95
+# A model is a floor if its area is `FLOOR_FACTOR` times the median, and at least `FLOOR_AREA`, and it is not `hollow`.
 FLOOR_FACTOR = 12.0
-FLOOR_AREA = 4.0  # m^2
+FLOOR_AREA = 6.0  # m^2
+# A model is hollow, like the walls of a building, if it covers less than this share of the rectangle around it.
+HOLLOW = 0.5
+# What hangs higher than this above the ground closes no door, m.
+HEAD = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +45,15 @@ class Footprint:
         """The area of the rectangle around it, m^2."""
         return (self.high[0] - self.low[0]) * (self.high[1] - self.low[1])
 
+    @property
+    def covered(self) -> float:
+        """The area of all its polygons, m^2."""
+        return sum(map(polygon_area, self.polygons))
+
+    @property
+    def hollow(self) -> bool:
+        return self.covered < HOLLOW * self.area
+
     def distance(self, point: Point) -> float:
         """The distance from a point to the nearest polygon, m; 0 inside. Without polygons, to the model's centre."""
         if not self.polygons:
@@ -47,19 +62,33 @@ class Footprint:
 
 
 def footprints(world: World) -> tuple[Footprint, ...]:
-    """Footprints of all models except the ground, the largest first, so that small ones are drawn on top."""
-    prints = [footprint(model) for model in world.models if not is_ground(model)]
-    return tuple(sorted(prints, key=lambda each: -each.area))
+    """Footprints of all models except the ground; those that cover most come first, so that small ones are drawn on top."""
+    ground = ground_height(world)
+    prints = [footprint(model, ground=ground) for model in world.models if not is_ground(model)]
+    return tuple(sorted(prints, key=lambda each: -each.covered))
 
 
-def footprint(model: Model, corners: int = ROUND, moved: Pose = HERE) -> Footprint:
+def ground_height(world: World) -> float:
+    """The height of the highest plane or large box, m; infinite without any: a mesh may be hills."""
+    flat = [
+        filled_bounds(one) for model in world.models for one in model.collisions if isinstance(one.shape, Plane | Box)
+    ]
+    tops = [float(high[2]) for low, high in flat if np.prod((high - low)[:2]) > FLOOR_AREA]
+    return max(tops, default=math.inf)
+
+
+def footprint(model: Model, corners: int = ROUND, moved: Pose = HERE, ground: float = math.inf) -> Footprint:
     """The footprint of `model`; a point without collision shapes. Circles become polygons with `corners` corners.
 
+    Pieces that begin more than `HEAD` above the `ground` (m), or else above its lowest point, are left out: the wall above a door.
     `moved` is how the model has moved as a whole since the world's file, in the world frame.
     """
     polygons = []
-    for each in model.collisions:
-        if not isinstance(each.shape, Plane):
+    pieces = [(each, shape_bounds(each.shape, moved @ each.pose)[0][2]) for each in model.collisions]
+    if math.isinf(ground):
+        ground = min((foot for _, foot in pieces), default=0.0)
+    for each, foot in pieces:
+        if not isinstance(each.shape, Ground) and foot <= ground + HEAD:
             pose = moved @ each.pose
             vertices, radius = vertices_of(each.shape, corners)
             flat = vertices @ pose.rotation()[:2].T + pose.position[:2]
@@ -88,7 +117,7 @@ def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
 class Drawn:
     """A model to draw from above. `center` and `size` are of the box around it, m.
 
-    `color` is that of its first visual, or the default of its kind if the file has none.
+    `color` is that of its first visual, or the default of its kind if the file has none, or white, as meshes without one have.
     """
 
     model: Model
@@ -109,15 +138,16 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
 
     Of equal tops the larger model comes first. Circles become polygons with `corners` corners.
     """
+    ground = ground_height(world)
     models = [model for model in world.models if not is_ground(model)]
-    outlines = [footprint(model, corners) for model in models]
+    outlines = [footprint(model, corners, ground=ground) for model in models]
     limit = max(FLOOR_AREA, FLOOR_FACTOR * float(np.median([each.area for each in outlines]))) if models else 0.0
     drawn = []
     for model, outline in zip(models, outlines, strict=True):
         center, size = model.pose.position, (0.0, 0.0, 0.0)
         if (box := model_bounds(model)) is not None:
             center, size = vector((box[0] + box[1]) / 2), vector(box[1] - box[0])
-        floor = len(models) > 2 and outline.area > limit
+        floor = len(models) > 2 and outline.area > limit and not outline.hollow
         drawn.append(Drawn(model, outline, center, size, _color(model), floor))
     return tuple(sorted(drawn, key=_turn))
 
@@ -129,8 +159,10 @@ def _turn(each: Drawn) -> tuple[int, float, float]:
 
 
 def _color(model: Model) -> RGB:
-    for visual in (visual for link in model.links for visual in link.visuals):
+    for visual in model.visuals:
         if visual.color is not None and visual.color[3] > 0 and not isinstance(visual.shape, Plane):
+            if min(visual.color[:3]) > WHITE:
+                break
             red, green, blue = (round(255 * min(1.0, max(0.0, part))) for part in visual.color[:3])
             return red, green, blue
     return STATIC if model.static else DYNAMIC

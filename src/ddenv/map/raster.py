@@ -119,18 +119,18 @@ def extent(prints: Sequence[Footprint], points: Iterable[Point]) -> tuple[np.nda
 class Outlines:
     """The polygons of all models in flat arrays: polygon p has `counts[p]` of the `corners` (M, 2) m, from `first[p]` on.
 
-    `models[p]` is the model of polygon p; `lengths[p]` and `widths[p]` are its diagonal and its mean width across it, m.
-    Per model: `centers` (N, 2) m, `areas` (N,) m^2, and `bare` (N,) if it has none.
+    `models[p]` is the model of polygon p, `middles[p]` (2,) m its middle; `lengths[p]` and `widths[p]` are its diagonal and its
+    mean width across it, m. Per model: `centers` (N, 2) m, and `bare` (N,) if it has none.
     """
 
     corners: np.ndarray
     first: np.ndarray
     counts: np.ndarray
     models: np.ndarray
+    middles: np.ndarray
     lengths: np.ndarray
     widths: np.ndarray
     centers: np.ndarray
-    areas: np.ndarray
     bare: np.ndarray
 
 
@@ -165,10 +165,10 @@ def pack(prints: Sequence[Footprint]) -> Outlines:
         first,
         counts,
         np.array([index for index, _ in polygons], dtype=np.intp),
+        (low + high) / 2,
         lengths,
         areas / np.maximum(lengths, 1e-12),
         np.array([each.center for each in prints]).reshape(-1, 2),
-        np.array([each.area for each in prints]),
         np.array([not each.polygons for each in prints], dtype=bool),
     )
 
@@ -180,9 +180,10 @@ def masks(prints: Sequence[Footprint], view: View) -> Spans:
 def spans(outlines: Outlines, view: View) -> Spans:
     width, height = view.columns, 2 * view.rows
     polygon, row, left, right = rows_of(outlines, view)
-    # A model smaller than a pixel stays visible.
-    tiny = np.flatnonzero((outlines.areas < 4 * view.scale**2) | outlines.bare)
-    middle = view.pixels(outlines.centers[tiny])
+    # What is smaller than a pixel stays visible.
+    small = outlines.lengths <= SHORT * view.scale
+    tiny = np.concatenate([outlines.models[small], np.flatnonzero(outlines.bare)])
+    middle = view.pixels(np.concatenate([outlines.middles[small], outlines.centers[outlines.bare]]))
     seen = ((middle >= 0) & (middle < (width, height))).all(axis=1)
     tiny, dots = tiny[seen], middle[seen].astype(np.intp)
     models = np.concatenate([outlines.models[polygon], tiny])

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from ddenv.text import Names, count, first_of
 from ddenv.world.model import World
 from ddenv.world.pose import Pose
+from ddenv.world.sdf.moved import link_poses
 
 # A model that moves farther than this before anything touches it was not at rest in the file, m.
 UNREST = 0.05
@@ -32,7 +33,7 @@ class Settled:
 
 def moved(world: World, settled: Settled) -> dict[str, float]:
     """How far each model has moved that is still in the world, m."""
-    starts = {model.name: [link.pose for link in model.links] for model in world.models}
+    starts = link_poses(world)
     gone = frozenset(settled.fallen)
     return {
         name: max(math.dist(one.position, there.position) for one, there in zip(starts[name], places, strict=True))

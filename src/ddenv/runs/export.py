@@ -107,7 +107,7 @@ def _margin(state: RunState, numbers: Mapping[str, Number], margin: str, run: Pa
     """The number that is meant, and its new value. Raises UserError."""
     name, _, given = margin.partition("=")
     if name not in numbers:
-        raise UserError(f"--margin: what is left has no number '{name}'{nearest(name, list(numbers))}")
+        raise UserError(f"--margin: what is left has no number '{name}'{nearest(name, numbers)}")
     if given:
         try:
             value = float(given)

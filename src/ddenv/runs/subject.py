@@ -18,7 +18,7 @@ from ddenv.runs.folder import named, named_file
 from ddenv.runs.remedies import REMEDIES, remembered, with_remedies
 from ddenv.runs.remembered import state_file
 from ddenv.schemas import nearest
-from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put, read
+from ddenv.settings import SETTINGS, Ignorable, MeshReading, Value, number_text, put, read
 from ddenv.text import Data, Names, first_of, shortened
 from ddenv.world.access import MissingFiles, is_read_as_world, read_bytes, resolved, write_file
 from ddenv.world.command import command_words
@@ -32,12 +32,14 @@ from ddenv.world.sdf.read import disk_of, parse_model, parse_world, read_model, 
 from ddenv.world.sdf.standin import AUTO, NONE, parse_option
 
 Announce = Callable[[str], None]
-# Downloads what a world lacks, which is read in this way.
-Fetch = Callable[[Path, Reading], None]
+# Reads the content of a file.
+Parse = Callable[[bytes, Path, Reading, Resources], object]
+# Downloads what a file lacks, which is read in this way.
+Fetch = Callable[[Path, Reading, Parse], None]
 # Prefix of the names of documents in a run file that hold other files.
 RESOURCE = "resource "
 # The options on how a world is read.
-READING = ("model_path", "stand_in", "ignore", "inside")
+READING = ("model_path", "stand_in", "ignore", "inside", "mesh")
 # Maximum number of remembered remedies that a line names, and the maximum width of each in cells.
 NAMED, LONGEST = 3, 60
 
@@ -107,7 +109,8 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
     read_as = reading_of(scenario.reading, **reading)
     scenario = with_options(scenario, reading=read_as, **others)
     if fetch is not None:
-        fetch(scenario.world, read_as)
+        fetch(scenario.world, read_as, parse_world)
+        fetch(scenario.robot.model, read_as, parse_model)
     if reads_remembered:
         read_as = with_remembered(scenario.world, read_as, announce)
         scenario = scenario.model_copy(update={"reading": read_as})
@@ -130,8 +133,12 @@ def reading_of(
     stand_in: Sequence[str] = (),
     ignore: Sequence[Ignorable] = (),
     inside: bool | None = None,
+    mesh: MeshReading | None = None,
 ) -> Reading:
-    """`reading` with more folders (searched first), stand-ins (`URI=SHAPE`), ignored elements and `inside`. Raises UserError."""
+    """`reading` with more folders (searched first), stand-ins (`URI=SHAPE`), ignored elements, `inside` and `mesh`.
+
+    Raises UserError.
+    """
     for folder in model_path:
         if not folder.is_dir():
             raise UserError(f"--model-path: there is no folder {folder}")
@@ -139,7 +146,13 @@ def reading_of(
     stand_ins = reading.stand_ins | dict(parse_option(option) for option in stand_in)
     ignored = dict.fromkeys((*reading.ignore, *ignore))
     within = reading.inside or bool(inside)
-    return Reading(model_path=folders, stand_ins=stand_ins, ignore=tuple(ignored), inside=within)
+    return Reading(
+        model_path=folders,
+        stand_ins=stand_ins,
+        ignore=tuple(ignored),
+        inside=within,
+        mesh=mesh or reading.mesh,
+    )
 
 
 def with_remembered(world: Path, reading: Reading, announce: Announce | None = None) -> Reading:
@@ -245,7 +258,7 @@ def with_values(data: Data, values: Mapping[str, Value]) -> Data:
     """A scenario as plain data, with settings replaced by name; None or 0 takes back a limit. Raises UserError."""
     for name in values:
         if name not in SETTINGS:
-            raise UserError(f"options: no setting '{name}'{nearest(name, list(SETTINGS))}")
+            raise UserError(f"options: no setting '{name}'{nearest(name, SETTINGS)}")
     # A setting that sets several others comes first, so that each of these may be given, too.
     for name in sorted(values, key=lambda each: SETTINGS[each].stored):
         put(data, SETTINGS[name], (values[name] or None) if SETTINGS[name].none else values[name])
@@ -279,7 +292,7 @@ def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
     if scenario.reading.inside and not any(model.inside for model in world.models):
         why = next((note.why for note in world.notes if note.what == "--inside"), "no static model has two collisions")
         raise UserError(f"{scenario.world}: --inside: no model has parts that can be removed: {why}")
-    check_spawn(world, robot, scenario.robot.spawn)
+    check_spawn(world, robot, scenario.robot.spawn, scenario.goal)
 
 
 # From a run file.

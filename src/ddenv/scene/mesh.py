@@ -15,8 +15,22 @@ import numpy as np
 from ddenv.scene import colors
 from ddenv.scene.colors import Color
 from ddenv.text import Data
-from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere, Visual
+from ddenv.world.model import (
+    Box,
+    Capsule,
+    Collision,
+    Cylinder,
+    Ellipsoid,
+    Mesh,
+    Model,
+    Plane,
+    Shape,
+    Sphere,
+    Terrain,
+    Visual,
+)
 from ddenv.world.pose import Point, Pose
+from ddenv.world.terrain import surface
 
 SIDES = 24  # of the polygon that stands for a circle
 # Minimum distance between points of a drawn trajectory, as part of its radius: a robot that stands still leaves one point.
@@ -182,6 +196,8 @@ def of_shape(shape: Shape) -> Surface:
             return replace(ball, vertices=ball.vertices * radii)
         case Mesh():
             return creased(shape)
+        case Terrain():
+            return creased(surface(shape))
     return EMPTY
 
 

@@ -62,9 +62,7 @@ def checked(wanted: Mapping[str, str], where: str) -> dict[str, str]:
     known = actions()
     for id in keymap:
         if id not in known:
-            raise UserError(
-                f"{where}: keys: there is no action '{id}'{nearest(id, list(known))}; 'ddenv config' lists them"
-            )
+            raise UserError(f"{where}: keys: there is no action '{id}'{nearest(id, known)}; 'ddenv config' lists them")
     for owner in _owners():
         _check_clashes(owner, keymap, where)
     return keymap

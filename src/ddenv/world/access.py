@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import stat
-import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from ddenv.errors import UserError
@@ -88,8 +89,7 @@ def xml_root(data: bytes) -> Element:
     try:
         return parse_xml(data, Path())
     except NotXml as error:
-        where = f"line {error.line}, column {error.column}: " if error.line else ""
-        raise Unusable(f"{where}{error}") from None
+        raise Unusable(str(error)) from None
 
 
 def size_of(path: Path) -> int:
@@ -117,11 +117,8 @@ def not_yaml(where: object, error: Exception) -> UserError:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether `path` is an accessible folder."""
-    try:
-        return stat.S_ISDIR(path.stat().st_mode)
-    except (OSError, ValueError):
-        return False
+    """Whether `path` is an accessible folder; a name that no file can have is none."""
+    return os.path.isdir(path)  # noqa: PTH112  # `Path.is_dir` may raise
 
 
 def folders_of(folder: Path) -> list[str]:
@@ -135,18 +132,12 @@ def folders_of(folder: Path) -> list[str]:
 
 def is_file(path: Path) -> bool:
     """Whether `path` is an accessible file. Any text is taken for a path: one that is too long, or holds a NUL byte, is none."""
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
+    return os.path.isfile(path)  # noqa: PTH113  # `Path.is_file` may raise
 
 
 def without_tilde(name: str) -> Path:
     """`name` with a leading `~` expanded, if the home folder is known."""
-    try:
-        return Path(name).expanduser()
-    except RuntimeError:
-        return Path(name)
+    return Path(os.path.expanduser(name))  # noqa: PTH111  # `Path.expanduser` may raise
 
 
 def reason(error: OSError) -> str:
@@ -177,19 +168,14 @@ def write_file(path: Path, content: bytes, mode: int = 0o666) -> None:
 
     `mode` are the file's permissions, from which the user's mask takes away.
     """
+    temporary = path.parent / f".{path.name}.{os.urandom(4).hex()}"
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written: {error.strerror}") from None
-    try:
-        with os.fdopen(handle, "wb") as file:
+        with open(temporary, "xb", opener=partial(os.open, mode=mode)) as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        mask = os.umask(0)
-        os.umask(mask)
-        Path(name).chmod(mode & ~mask)
-        Path(name).replace(path)
+        temporary.replace(path)
     except OSError as error:
-        Path(name).unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink()
         raise UserError(f"{path}: cannot be written: {error.strerror}") from None

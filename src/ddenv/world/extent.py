@@ -22,6 +22,7 @@ from ddenv.world.model import (
     Plane,
     Shape,
     Sphere,
+    Terrain,
     World,
 )
 from ddenv.world.pose import HERE, Point, Pose, Vector, vector
@@ -49,6 +50,10 @@ def shape_bounds(shape: Shape, pose: Pose) -> Bounds:
             half = np.full(3, radius)
         case Plane():
             half = np.zeros(3)
+        case Terrain((length, width), heights):
+            lowest, highest = float(heights.min()), float(heights.max())
+            place = pose @ Pose((0.0, 0.0, (lowest + highest) / 2))
+            return shape_bounds(Box((length, width, highest - lowest)), place)
     return center - half, center + half
 
 
@@ -58,7 +63,7 @@ _CUBE = np.array(list(product((-0.5, 0.5), repeat=3)))
 
 
 def vertices_of(shape: Shape, sides: int = SIDES) -> tuple[np.ndarray, float]:
-    """The vertices (N, 3) m of a shape other than a plane in its own frame, and how much it is larger than their hull, m."""
+    """The vertices (N, 3) m of a shape other than ground in its own frame, and how much it is larger than their hull, m."""
     ends = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
     match shape:
         case Box(size):
@@ -87,9 +92,12 @@ def circle(sides: int) -> np.ndarray:
 
 
 def filled_bounds(collision: Collision) -> Bounds:
-    """The box around what a shape fills: all that is below a plane, everything if that leans."""
+    """The box around what a shape fills: all that is below a plane or terrain, everything if a plane leans."""
+    low, high = shape_bounds(collision.shape, collision.pose)
+    if isinstance(collision.shape, Terrain):
+        low[2] = -np.inf
     if not isinstance(collision.shape, Plane):
-        return shape_bounds(collision.shape, collision.pose)
+        return low, high
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     if collision.pose.rotation()[2, 2] > 1 - 1e-9:
         high[2] = collision.pose.position[2]
@@ -160,7 +168,7 @@ BEYOND = 20.0  # minimum width of ground beyond all models, m
 
 def corners(world: World) -> tuple[Vector, Vector] | None:
     """The lowest and the highest corner of the box around all models, m; None if there are none."""
-    box = bounds(one for model in world.models for one in model.collisions)
+    box = bounds(world.collisions)
     return None if box is None else (vector(box[0]), vector(box[1]))
 
 
@@ -169,7 +177,7 @@ def with_ground_boxes(world: World, box: tuple[Vector, Vector] | None, places: I
 
     Drake crashes with half spaces among hundreds of boxes, and on the bodies that its parser makes of static models (drake#19263).
     """
-    if not any(isinstance(one.shape, Plane) for model in world.models for one in model.collisions):
+    if not any(isinstance(one.shape, Plane) for one in world.collisions):
         return world
     within = product(*zip(*box, strict=True)) if box else ()
     points = np.array([*within, *places], dtype=float).reshape(-1, 3)

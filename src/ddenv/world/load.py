@@ -112,7 +112,7 @@ def validate(data: Data, where: str, named: Mapping[str, str] = {}) -> Scenario:
         ("pair", scenario.reduction.pair, list(schemas.pairs()), pairs),
     ):
         if value not in names:
-            words = f"{_shown(value)} is not allowed{nearest(value[:100], names)}; use one of {allowed}"
+            words = f"{_shown(value)} is not allowed{nearest(value, names)}; use one of {allowed}"
             raise _wrong(where, f"reduction.{key}", words, named)
     return scenario
 

@@ -72,17 +72,45 @@ class Mesh:
     simplified: bool = field(default=False, compare=False)
 
 
-Shape = Box | Cylinder | Sphere | Plane | Capsule | Ellipsoid | Mesh
+@dataclass(frozen=True, slots=True)
+class Terrain:
+    """Solid ground below `heights` (R, C) m, which lie on a grid of `size` (x, y) m around its frame's origin.
+
+    Rows follow y, columns x. Between four heights the surface is bilinear.
+    Terrains are equal if they have the same `origin`, as meshes are.
+    """
+
+    size: tuple[float, float]
+    heights: np.ndarray = field(compare=False, repr=False)
+    origin: str
+
+
+# What has no closed surface, but is solid below.
+Ground = Plane | Terrain
+Shape = Box | Cylinder | Sphere | Capsule | Ellipsoid | Mesh | Ground
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A convex piece of `mesh`, which is not convex, and its `pose` in the frame of that."""
+
+    mesh: Mesh
+    pose: Pose
 
 
 @dataclass(frozen=True, slots=True)
 class Collision:
-    """`mu` is the Coulomb friction coefficient: the smaller of SDF's `ode/mu` and `ode/mu2`."""
+    """`mu` is the Coulomb friction coefficient: the smaller of SDF's `ode/mu` and `ode/mu2`.
+
+    The pieces of a mesh that is not convex follow each other in their link, all with the `name` of their `<collision>`;
+    `piece` says what they are pieces of.
+    """
 
     name: str
     shape: Shape
     pose: Pose
     mu: float
+    piece: Piece | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +202,10 @@ class Model:
     def collisions(self) -> tuple[Collision, ...]:
         return tuple(collision for link in self.links for collision in link.collisions)
 
+    @property
+    def visuals(self) -> tuple[Visual, ...]:
+        return tuple(visual for link in self.links for visual in link.visuals)
+
 
 def held_with(model: Model, name: str) -> frozenset[str]:
     """The link `name` (or "world") and all that fixed joints hold together with it, directly or through others."""
@@ -236,8 +268,9 @@ class Shared:
 class World:
     """An SDF world. `text` is the file's content; `models` are in the file's order; `gravity` is in m/s^2.
 
-    `anchors` names the models that others are placed relative to: without them the file would be invalid. `resources` holds
-    everything read from other files (`ddenv.world.files.resources`), so that `text` can be read again without them.
+    `anchors` names the models that others depend on, which always stay: others are placed relative to them, or are copies of the
+    same text. `resources` holds everything read from other files (`ddenv.world.files.resources`), so that `text` can be read again
+    without them.
     `ties` has (model, other) where a model is welded to another and so cannot stay without it. `shared` has byte ranges of `text`
     that go when several models are gone. `found` are the other files that were read from disk, `absent` the URIs without one.
     `guessed` has (model, URI) where a shape of the model is a guess.
@@ -265,6 +298,10 @@ class World:
         raise KeyError(name)
 
     @property
+    def collisions(self) -> tuple[Collision, ...]:
+        return tuple(collision for model in self.models for collision in model.collisions)
+
+    @property
     def names(self) -> Names:
         """The names of all models, in the file's order."""
         return tuple(model.name for model in self.models)
@@ -284,13 +321,13 @@ ENDLESS = 200.0
 
 
 def is_ground(model: Model) -> bool:
-    """Whether the model holds an infinite plane, or a box that stands for one (as `ddenv.world.write` writes it).
+    """Whether the model holds terrain, an infinite plane, or a box that stands for one (as `ddenv.world.write` writes it).
 
     The ground carries everything else: it is never an element.
     """
-    if any(isinstance(collision.shape, Plane) for collision in model.collisions):
+    if any(isinstance(collision.shape, Ground) for collision in model.collisions):
         return True
-    shown = any(isinstance(visual.shape, Plane) for link in model.links for visual in link.visuals)
+    shown = any(isinstance(visual.shape, Plane) for visual in model.visuals)
     boxes = (one.shape.size for one in model.collisions if isinstance(one.shape, Box)) if shown else ()
     return any(min(size[:2]) >= ENDLESS for size in boxes)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product, starmap
 
@@ -13,9 +13,11 @@ from ddenv.errors import UserError
 from ddenv.text import count, first_of
 from ddenv.world.drive import turning_links
 from ddenv.world.extent import Bounds, around, bounds, filled_bounds, model_bounds, shape_bounds, stacked, vertices_of
-from ddenv.world.model import Collision, Mesh, Model, Plane, Shape, World, is_ground
-from ddenv.world.pose import Point, Pose
-from ddenv.world.scenario import Spawn
+from ddenv.world.model import Collision, Ground, Mesh, Model, Plane, Terrain, World, is_ground
+from ddenv.world.passage import Clearance, clearance
+from ddenv.world.pose import Pose
+from ddenv.world.scenario import Goal, Spawn
+from ddenv.world.terrain import height_above
 
 # Tolerated overlap, m: contacts at rest overlap slightly, and numbers in files are rounded.
 TOLERANCE = 0.02
@@ -23,6 +25,11 @@ TOLERANCE = 0.02
 LARGER = 3.0
 # What is seen of a thin sheet counts as so wide, m.
 THIN = 0.05
+UNLIKE = {
+    "unseen": "models without a visual, which can be hit but not seen",
+    "passable": "models without a collision, which can be seen but not hit",
+    "larger": f"models whose collision is more than {LARGER:g} times as wide as what is seen",
+}
 # A line names so many models.
 MOST_NAMES = 3
 # The steps in which a free place is looked for, and how far, m.
@@ -34,9 +41,9 @@ def spawn_pose(spawn: Spawn) -> Pose:
     return Pose.from_rpy(spawn.x, spawn.y, spawn.z, 0.0, 0.0, spawn.yaw)
 
 
-def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
+def check_spawn(world: World, robot: Model, spawn: Spawn, goal: Goal | None = None) -> None:
     """Raises UserError if the robot, placed at `spawn`, stands inside a model or below the ground; it names a free place nearby."""
-    if found := stands_inside(world, robot, spawn):
+    if found := stands_inside(world, robot, spawn, goal):
         why, free = found
         hint = (
             "move the spawn" if free is None else f"free nearby: --spawn={free.x:g},{free.y:g},{free.z:g},{free.yaw:g}"
@@ -44,16 +51,18 @@ def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
         raise UserError(f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g}): {why}; {hint}")
 
 
-def stands_inside(world: World, robot: Model, spawn: Spawn) -> tuple[str, Spawn | None] | None:
+def stands_inside(
+    world: World, robot: Model, spawn: Spawn, goal: Goal | None = None
+) -> tuple[str, Spawn | None] | None:
     """That the robot at `spawn` stands inside a model, in words, and the nearest free place; None if its own is free.
 
-    That is on a grid of `STEP`; None if there is none within `FAR`.
+    That is on a grid of `STEP`; None if there is none within `FAR`. Places from which a way leads to the `goal` come first.
     Raises UserError for a robot without collision shapes.
     """
     shapes, boxes = _shapes(world)
     if (found := _obstacle(shapes, boxes, robot, spawn)) is None:
         return None
-    model, depth, shape = found
+    model, depth, collision = found
 
     def moved(x: float, y: float, z: float) -> Spawn:
         places = {"x": round(spawn.x + x, 2), "y": round(spawn.y + y, 2), "z": round(spawn.z + z, 2)}
@@ -63,10 +72,54 @@ def stands_inside(world: World, robot: Model, spawn: Spawn) -> tuple[str, Spawn 
     heights = [0.0, depth + 0.01]
     sides = [number * STEP for number in range(-round(FAR / STEP), round(FAR / STEP) + 1)]
     moves = sorted(product(sides, sides, heights), key=lambda move: math.hypot(*move))
-    free = next((place for place in starmap(moved, moves) if _obstacle(shapes, boxes, robot, place) is None), None)
+    places: Iterable[Spawn] = starmap(moved, moves)
+    if goal is not None:
+        places = _by_room(places, world, robot, spawn, goal)
+    free = next((place for place in places if _obstacle(shapes, boxes, robot, place) is None), None)
     # The hull of a hollow mesh fills space that looks free.
-    what = "the convex hull of model" if isinstance(shape, Mesh) else "model"
+    is_hull = isinstance(collision.shape, Mesh) and collision.piece is None
+    what = "the convex hull of model" if is_hull else "model"
     return f"the robot stands inside {what} '{model.name}' by {depth:.2f} m", free
+
+
+def _by_room(places: Iterable[Spawn], world: World, robot: Model, spawn: Spawn, goal: Goal) -> list[Spawn]:
+    """Places near `spawn`, sorted: outdoors last if the goal is not, first those from which the robot gets to the goal."""
+    room, width = _clearance(world, robot, spawn, goal)
+    end = room.near((goal.x, goal.y), goal.tolerance)
+    outdoors = room.outdoors()
+    outdoors &= not outdoors[end].any()
+    # Where it stands, it has less room than between two columns that block it.
+    inside = room.joined(width - room.cell, end)
+    worse = 2 * outdoors + ~inside
+
+    def badness(place: Spawn) -> int:
+        column = (np.array((place.x, place.y)) - room.middles[0, 0]) / room.cell
+        return int(worse[tuple(np.rint(column).astype(int))])
+
+    return sorted(places, key=badness)
+
+
+def _clearance(world: World, robot: Model, spawn: Spawn, goal: Goal) -> tuple[Clearance, float]:
+    """The clearance of the robot on the height on which it comes to stand, and its width, m."""
+    own = bounds(robot.collisions, robot.pose.inverse())
+    assert own is not None
+    size = own[1] - own[0]
+    # Which side is its front is not known.
+    width = float(size[:2].min())
+    level = spawn.z + float(own[0][2]) - drop(world, robot, spawn)
+    return clearance(world, width, float(size[2]), level, [(spawn.x, spawn.y), (goal.x, goal.y)]), width
+
+
+def note_passage(world: World, robot: Model, spawn: Spawn, goal: Goal) -> Iterator[tuple[str, str]]:
+    """That no way from the start to the goal is wide enough for the robot."""
+    room, width = _clearance(world, robot, spawn, goal)
+    start = room.near((spawn.x, spawn.y), width / 2)
+    end = room.near((goal.x, goal.y), goal.tolerance)
+    if room.joined(width + room.cell / 2, start)[end].any():
+        return
+    widest = room.widest(start, end)
+    wide = f"no way from start to goal is wider than {widest:.2f} m: the robot is {width:.2f} m wide"
+    yield "passage", wide if widest else "no way leads from start to goal"
 
 
 def at_start(world: World, robot: Model, spawn: Spawn) -> Model | None:
@@ -83,7 +136,7 @@ def _shapes(world: World) -> tuple[list[tuple[Model, Collision]], Bounds]:
 
 def _obstacle(
     shapes: Sequence[tuple[Model, Collision]], boxes: Bounds, robot: Model, spawn: Spawn
-) -> tuple[Model, float, Shape] | None:
+) -> tuple[Model, float, Collision] | None:
     """The first model that the robot at `spawn` is inside of, how deep, m, and in which shape; None if its place is free.
 
     `boxes` are around the shapes of all models, which come one model after another.
@@ -92,20 +145,22 @@ def _obstacle(
     own = bounds(robot.collisions, place)
     if own is None:
         raise UserError(f"robot.model: '{robot.name}' has no collision shapes")
-    bodies = [hull(one, place) for one in robot.collisions if not isinstance(one.shape, Plane)]
-    found: tuple[Model, float, Shape] | None = None
+    bodies = [hull(one, place) for one in robot.collisions if not isinstance(one.shape, Ground)]
+    found: tuple[Model, float, Collision] | None = None
     near = ((own[0] <= boxes[1]) & (boxes[0] <= own[1])).all(axis=1)
     for model, one in (shapes[number] for number in np.flatnonzero(near).tolist()):
         if found is not None and found[0] is not model:
             break
         depth = max(_depth(body, one) for body in bodies)
         if depth > (TOLERANCE if found is None else found[1]):
-            found = model, depth, one.shape
+            found = model, depth, one
     return found
 
 
 def _depth(body: Hull, obstacle: Collision) -> float:
     """How deep a body is inside an obstacle, m."""
+    if isinstance(obstacle.shape, Terrain):
+        return body.radius - height_above(obstacle.shape, obstacle.pose, body.vertices)
     if not isinstance(obstacle.shape, Plane):
         return overlap(body, hull(obstacle))
     up = np.array(obstacle.pose.rotate((0.0, 0.0, 1.0)))
@@ -131,8 +186,8 @@ class Inside:
     depth: float
 
 
-def notes_on_start(world: World, robot: Model, spawn: Spawn, goal: Point | None = None) -> Iterator[tuple[str, str]]:
-    """What is wrong with the start of the robot in `world`, and with its `goal` (x, y), m: a word and a sentence for each."""
+def notes_on_start(world: World, robot: Model, spawn: Spawn, goal: Goal | None = None) -> Iterator[tuple[str, str]]:
+    """What is wrong with the start of the robot in `world`, and with its `goal`: a word and a sentence for each."""
     height = drop(world, robot, spawn)
     if height > DROP:
         yield "drop", f"the robot starts {height:.2f} m above the surface below it and drops; lower the spawn's z"
@@ -144,15 +199,22 @@ def notes_on_start(world: World, robot: Model, spawn: Spawn, goal: Point | None 
             "wheels",
             f"no wheel touches anything: the robot stands on its body, its wheels {hanging:.2f} m above the ground",
         )
-    # Planes and meshes may be ground.
+    if goal is not None:
+        yield from _note_goal(world, goal, spawn.z)
+        yield from note_passage(world, robot, spawn, goal)
+    yield from note_inside(world)
+
+
+def _note_goal(world: World, goal: Goal, height: float) -> Iterator[tuple[str, str]]:
+    """That the goal lies inside a model at this height, m."""
+    # Meshes may be ground, too.
     solid = (
-        (model, one) for model in world.models for one in model.collisions if not isinstance(one.shape, (Plane, Mesh))
+        (model, one) for model in world.models for one in model.collisions if not isinstance(one.shape, Ground | Mesh)
     )
-    place = Hull(np.array([[*(goal or ()), spawn.z]]))
-    blocker = next((model.name for model, one in solid if goal and _depth(place, one) > TOLERANCE), None)
+    place = Hull(np.array([[goal.x, goal.y, height]]))
+    blocker = next((model.name for model, one in solid if _depth(place, one) > TOLERANCE), None)
     if blocker is not None:
         yield "goal", f"at the height of the start, the goal lies inside {blocker}; move the goal"
-    yield from note_inside(world)
 
 
 def note_floor(world: World, robot: Model, spawn: Spawn, removable: Collection[str]) -> Iterator[tuple[str, str]]:
@@ -188,40 +250,44 @@ def note_inside(world: World) -> Iterator[tuple[str, str]]:
 
 
 def note_unseen(world: World, among: Collection[str]) -> Iterator[tuple[str, str]]:
-    """What `among` these models the robot may hit where nothing is seen. A world without any visual is not made to be looked at."""
-    if not any(link.visuals for model in world.models for link in model.links):
+    """What `among` these models the robot may hit where nothing is seen, or not hit where something is.
+
+    A world without any visual is not made to be looked at.
+    """
+    if not any(model.visuals for model in world.models):
         return
     # A visual that was not read may be there.
     unread = {note.model for note in world.notes if note.kind == "ignored"}
-    unseen: list[str] = []
-    larger: list[str] = []
-    for model in world.models:
-        hit = model_bounds(model)
-        if hit is None or model.name not in among or model.name in unread:
-            continue
-        visuals = (visual for link in model.links for visual in link.visuals)
-        seen = around(shape_bounds(visual.shape, visual.pose) for visual in visuals)
-        if seen is None:
-            unseen.append(model.name)
-        elif ((hit[1] - hit[0])[:2] > LARGER * np.maximum(seen[1] - seen[0], THIN)[:2]).any():
-            larger.append(model.name)
-    if unseen:
-        yield "unseen", f"models without a visual, which can be hit but not seen: {first_of(unseen, MOST_NAMES)}"
-    if larger:
-        yield (
-            "larger",
-            f"models whose collision is more than {LARGER:g} times as wide as what is seen: {first_of(larger, MOST_NAMES)}",
-        )
+    models = [model for model in world.models if model.name in among and model.name not in unread]
+    kinds = {model.name: _unlike(model) for model in models}
+    for about, words in UNLIKE.items():
+        names = [name for name, kind in kinds.items() if kind == about]
+        if names:
+            yield about, f"{words}: {first_of(names, MOST_NAMES)}"
+
+
+def _unlike(model: Model) -> str:
+    """In which way, of those in UNLIKE, what can be hit of a model is unlike what is seen of it; "" if it is not."""
+    hit = model_bounds(model)
+    seen = around(shape_bounds(visual.shape, visual.pose) for visual in model.visuals)
+    if seen is None:
+        return "" if hit is None else "unseen"
+    size = seen[1] - seen[0]
+    if hit is None:
+        # Nobody minds driving over what is flat, such as the lines on a floor.
+        return "passable" if size[2] > THIN else ""
+    is_larger = ((hit[1] - hit[0])[:2] > LARGER * np.maximum(size, THIN)[:2]).any()
+    return "larger" if is_larger else ""
 
 
 def inside(world: World) -> list[Inside]:
     """Models of which one can move, and one starts deeper than `INSIDE` in the other."""
-    shapes = [(model, one) for model in world.models for one in model.collisions]
+    shapes, boxes = _shapes(world)
     deepest: dict[tuple[str, str], float] = {}
-    for first, second in islice(_near(shapes), MOST_PAIRS):
+    for first, second in islice(_near(shapes, boxes), MOST_PAIRS):
         (model, shape), (other, obstacle) = shapes[first], shapes[second]
         # What cannot move, or has no end, is the obstacle.
-        if model.static or isinstance(shape.shape, Plane):
+        if model.static or isinstance(shape.shape, Ground):
             (model, shape), (other, obstacle) = (other, obstacle), (model, shape)
         depth = _depth(hull(shape), obstacle)
         if depth > INSIDE:
@@ -230,9 +296,12 @@ def inside(world: World) -> list[Inside]:
     return [Inside(*pair, depth) for pair, depth in deepest.items()]
 
 
-def _near(shapes: Sequence[tuple[Model, Collision]]) -> Iterator[tuple[int, int]]:
-    """The shapes of two models that may overlap, one of which can move: by the boxes around them, swept along x."""
-    low, high = stacked(filled_bounds(one) for _, one in shapes)
+def _near(shapes: Sequence[tuple[Model, Collision]], boxes: Bounds) -> Iterator[tuple[int, int]]:
+    """The shapes of two models that may overlap, one of which can move.
+
+    By the `boxes` around them, swept along x.
+    """
+    low, high = boxes
     free = np.array([not model.static for model, _ in shapes], dtype=bool)
     names = {id(model): number for number, (model, _) in enumerate(shapes)}
     owners = np.array([names[id(model)] for model, _ in shapes], dtype=int)
@@ -249,7 +318,7 @@ def _near(shapes: Sequence[tuple[Model, Collision]]) -> Iterator[tuple[int, int]
 
 def overlap_of(model: Model, other: Model) -> float:
     """How deep a model is inside another one, m; 0 if they do not overlap. Planes are no bodies."""
-    bodies = [hull(one) for one in model.collisions if not isinstance(one.shape, Plane)]
+    bodies = [hull(one) for one in model.collisions if not isinstance(one.shape, Ground)]
     return max((_depth(body, one) for body in bodies for one in other.collisions), default=0.0)
 
 
@@ -259,9 +328,13 @@ def drop(world: World, robot: Model, spawn: Spawn) -> float:
     Everything is taken as large as the box around it.
     """
     place = spawn_pose(spawn) @ robot.pose.inverse()
-    boxes = [shape_bounds(one.shape, place @ one.pose) for one in robot.collisions if not isinstance(one.shape, Plane)]
+    bodies = [hull(one, place) for one in robot.collisions if not isinstance(one.shape, Ground)]
+    boxes = [shape_bounds(one.shape, place @ one.pose) for one in robot.collisions if not isinstance(one.shape, Ground)]
     heights = []
-    for collision in (one for model in world.models for one in model.collisions):
+    for collision in world.collisions:
+        if isinstance(collision.shape, Terrain):
+            heights += [-depth for body in bodies if (depth := _depth(body, collision)) > -math.inf]
+            continue
         low, high = shape_bounds(collision.shape, collision.pose)
         endless = isinstance(collision.shape, Plane)
         below = (bottom for bottom, top in boxes if endless or ((bottom < high)[:2].all() and (low < top)[:2].all()))
@@ -279,7 +352,7 @@ class Hull:
 
 
 def hull(collision: Collision, place: Pose | None = None) -> Hull:
-    """The convex body of a collision shape other than a plane, moved by `place`."""
+    """The convex body of a collision shape other than ground, moved by `place`."""
     pose = collision.pose if place is None else place @ collision.pose
     vertices, radius = vertices_of(collision.shape)
     return Hull(vertices @ pose.rotation().T + pose.position, radius)

@@ -131,6 +131,13 @@ def pointing(axis: Vector) -> Pose:
     return Pose(quaternion=(w, -y / (2 * w), x / (2 * w), 0.0))
 
 
+def turn(axis: Vector, angle: float) -> Pose:
+    """The rotation by `angle`, rad, about the unit vector `axis`."""
+    x, y, z = axis
+    sine = math.sin(angle / 2)
+    return Pose(quaternion=(math.cos(angle / 2), x * sine, y * sine, z * sine))
+
+
 def vector(values: Iterable[float]) -> Vector:
     """Three numbers, such as a row of an array, as a plain vector."""
     x, y, z = values

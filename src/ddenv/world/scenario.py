@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
 from ddenv import settings
-from ddenv.settings import FARTHEST, TURNS, Ignorable
+from ddenv.settings import FARTHEST, TURNS, Ignorable, MeshReading
 from ddenv.text import Data, Names
 
 # Maximum of all other numbers.
@@ -48,12 +48,14 @@ class Reading(Section):
     `model_path` are folders that hold models. `stand_ins` maps the beginning of a URI to a simple shape that stands in for what
     cannot be found there, such as `cylinder:0.3,1.0`, or `*`, all that is missing, to `auto`. `ignore` names kinds of elements
     to leave out instead of refusing the file. With `inside`, each collision of a model that never moves is a model of its own.
+    What collides in place of a mesh that is not convex is `mesh`: its convex pieces, or its convex hull.
     """
 
     model_path: tuple[Path, ...] = ()
     stand_ins: dict[str, str] = {}
     ignore: tuple[Ignorable, ...] = ()
     inside: bool = False
+    mesh: MeshReading = "pieces"
 
 
 PLAIN = Reading()

@@ -23,8 +23,8 @@ _TAG = re.compile(rb"<\s*+(/?)(" + _NAME + rb")")
 _ATTRIBUTE = re.compile(rb"\s*+(" + _NAME + rb""")\s*+=\s*+(?:"([^"]*+)"|'([^']*+)')""")
 _HALF_ATTRIBUTE = re.compile(rb"\s*+(" + _NAME + rb")\s*+(=?)\s*+([\"']?)")
 _TAG_END = re.compile(rb"\s*+(/?)>")
-_SPACE = re.compile(rb"\s*+")
-_CONTROLS = bytes(code for code in range(0x20) if code not in b"\t\n\r")
+_VISIBLE = re.compile(rb"\S")
+_CONTROL = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")
 _DECLARATION = re.compile(rb"<\?xml[\s?]")
 _ENCODING = re.compile(rb"""\s*<\?xml\s[^>]*?encoding\s*=\s*["']([^"'>]*)["']""")
 _REFERENCE = re.compile(r"&(?:#x([0-9a-fA-F]+)|#([0-9]+)|(quot|amp|apos|lt|gt));")
@@ -33,10 +33,14 @@ _NO_DOCTYPE = "DOCTYPE is not allowed (its entities can read other files and exh
 
 
 class NotXml(Exception):
-    """Text that cannot be read. The message says why; `line` and `column`, counted from 1, say where; 0 is the whole file."""
+    """Text that cannot be read: `why`, and at which `line` and `column`, counted from 1.
+
+    The message has all of this. Of a fault of the whole file, line and column are 0.
+    """
 
     def __init__(self, why: str, line: int = 0, column: int = 0) -> None:
-        super().__init__(why)
+        super().__init__(f"line {line}, column {column}: {why}" if line else why)
+        self.why = why
         self.line = line
         self.column = column
 
@@ -71,9 +75,8 @@ def parse_xml(text: bytes, source: Path, root: str = "") -> Element:
         raise NotXml("is UTF-16, UTF-32 or not text; save it as UTF-8")
     start = len(BYTE_ORDER_MARK) if text.startswith(BYTE_ORDER_MARK) else 0
     scanner = _Scanner(text, source, _encoding(text, start), at=start)
-    if len(text.translate(None, _CONTROLS)) < len(text):
-        at = next(at for at, code in enumerate(text) if code in _CONTROLS)
-        raise scanner.fault(at, f"a control character (byte 0x{text[at]:02x})")
+    if control := _CONTROL.search(text):
+        raise scanner.fault(control.start(), f"a control character (byte 0x{ord(control[0]):02x})")
     scanner.run()
     if not scanner.roots:
         raise scanner.fault(len(text), "no element found")
@@ -112,14 +115,11 @@ def _encoding(text: bytes, start: int) -> str:
     # Some programs write UTF-8 and call it UTF-16.
     if name.lower().startswith("utf"):
         return "utf-8"
-    ascii_bytes = bytes(range(128))
-    all_bytes = bytes(range(256))
     try:
-        extends_ascii = ascii_bytes.decode(name) == ascii_bytes.decode("ascii")
-        one_byte_each = len(all_bytes.decode(name, "replace")) == len(all_bytes)
+        characters = bytes(range(256)).decode(name, "replace")
     except (LookupError, ValueError):
-        extends_ascii = one_byte_each = False
-    if not (extends_ascii and one_byte_each):
+        characters = ""
+    if len(characters) != 256 or not characters.startswith(bytes(range(128)).decode()):
         raise NotXml(f"cannot be decoded: the encoding '{name[:40]}' is not supported; save it as UTF-8")
     return name
 
@@ -153,9 +153,9 @@ class _Scanner:
                 return
         if self.open:
             raise self.fault(self.open[-1].start, f"<{_short(self.open[-1].tag)}> has no end tag")
-        rest = _SPACE.match(self.text, self.at)
-        if self.roots and rest is not None and rest.end() < len(self.text):
-            raise self.fault(rest.end(), "text after the last element")
+        rest = _VISIBLE.search(self.text, self.at)
+        if self.roots and rest is not None:
+            raise self.fault(rest.start(), "text after the last element")
 
     def fault(self, at: int, why: str) -> NotXml:
         """The error of what TinyXML2 refuses, at byte `at`."""
@@ -239,13 +239,17 @@ class _Scanner:
         """What is wrong with the tag that begins at byte `start` and has been read up to `at`."""
         half = _HALF_ATTRIBUTE.match(self.text, self.at)
         if half is None:
-            space = _SPACE.match(self.text, self.at)
-            at = self.at if space is None else space.end()
-            if at == len(self.text):
+            rest = _VISIBLE.search(self.text, self.at)
+            if rest is None:
                 return self.fault(start, f"the tag <{_short(tag)} is not closed by '>'")
-            return self.fault(at, f"expected an attribute or '>' in the tag <{_short(tag)}")
+            why = f"expected an attribute or '>' in the tag <{_short(tag)}"
+            return self.fault(rest.start(), why)
         name = _short(half[1].decode(self.encoding, "replace"))
-        why = "has no closing quote" if half[3] else "has no quotes around its value" if half[2] else "has no value"
+        why = "has no value"
+        if half[3]:
+            why = "has no closing quote"
+        elif half[2]:
+            why = "has no quotes around its value"
         return self.fault(half.start(1), f"attribute '{name}' in <{_short(tag)}> {why}")
 
     def _open(self, tag: str, attributes: dict[str, str], start: int) -> None:
@@ -306,7 +310,7 @@ class _Scanner:
 
 
 def _plain_newlines(words: str) -> str:
-    return words.replace("\r\n", "\n").replace("\r", "\n") if "\r" in words else words
+    return words.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _is_character(code: int) -> bool:

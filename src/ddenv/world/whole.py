@@ -14,7 +14,7 @@ def whole_of(world: World, scenario: Scenario) -> Whole:
     """What all parts of `world` share; of a world that is itself a part, what the scenario says."""
     if scenario.whole is not None:
         return scenario.whole
-    heights = [shape_bounds(one.shape, one.pose)[0][2] for model in world.models for one in model.collisions]
+    heights = [shape_bounds(one.shape, one.pose)[0][2] for one in world.collisions]
     return Whole(
         floor=float(min(heights, default=0.0)) - FALL,
         corners=corners(world),

@@ -32,11 +32,13 @@ from ddenv.world.model import (
     Plane,
     Shape,
     Sphere,
+    Terrain,
     Visual,
     World,
     unique_names,
 )
 from ddenv.world.pose import Pose, Vector
+from ddenv.world.terrain import surface
 
 DRAKE = "http://drake.mit.edu"
 _LINE_START = re.compile(rb"(\r\n|\n|\r)[ \t]*\Z")
@@ -67,6 +69,7 @@ def convert(world: World, mesh_folder: str) -> tuple[bytes, dict[str, Mesh]]:
     files: dict[Mesh, str] = {}
     for link in (link for model in world.models for link in model.links):
         for shape in (*(one.shape for one in link.collisions), *(one.shape for one in link.visuals)):
+            shape = as_mesh(shape)
             if isinstance(shape, Mesh):
                 files.setdefault(shape, f"{mesh_folder}/mesh_{len(files) + 1}.obj")
     ElementTree.register_namespace("drake", DRAKE)
@@ -140,10 +143,11 @@ def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, file
     element = SubElement(parent, "collision" if isinstance(one, Collision) else "visual", name=name)
     _pose(element, back @ one.pose)
     geometry = SubElement(element, "geometry")
-    if isinstance(one.shape, Mesh):
+    mesh_shape = as_mesh(one.shape)
+    if isinstance(mesh_shape, Mesh):
         mesh = SubElement(geometry, "mesh")
-        SubElement(mesh, "uri").text = files[one.shape]
-        if isinstance(one, Collision):
+        SubElement(mesh, "uri").text = files[mesh_shape]
+        if isinstance(one, Collision) and isinstance(one.shape, Mesh):
             SubElement(mesh, f"{{{DRAKE}}}declare_convex")
     else:
         kind, sizes = primitive(one.shape)
@@ -158,6 +162,11 @@ def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, file
         material = SubElement(element, "material")
         for tag in ("ambient", "diffuse"):
             SubElement(material, tag).text = _numbers(one.color)
+
+
+def as_mesh(shape: Shape) -> Shape:
+    """The triangles of terrain; any other shape as it is."""
+    return surface(shape) if isinstance(shape, Terrain) else shape
 
 
 def _axis(holder: Element, axis: Vector, joint: Joint) -> None:

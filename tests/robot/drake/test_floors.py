@@ -17,16 +17,14 @@ from ddenv.robot.drake.contact_shapes import Placed
 from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.template import Template
 from ddenv.world.files.meshes import convex_hull
-from ddenv.world.model import Box, Collision, Cylinder, Inertia, Link, Mesh, Model, Shape, Sphere, World
+from ddenv.world.model import Box, Collision, Cylinder, Inertia, Link, Mesh, Model, Sphere
 from ddenv.world.pose import HERE, Pose
 from tests.robot.conftest import bits, cube
+from tests.robot.drake.conftest import EDGE, WIDTH, piece, static
 from tests.tiers import examples
 
 LENGTH = 4.0  # of the platform, m
-WIDTH = 6.0
 THICK = 0.5
-EDGE = 1.5  # where the platform begins, m ahead of the robot
-ROAD = Box((6.0, WIDTH, 0.1))
 
 
 def box_mesh(size: tuple[float, float, float]) -> Mesh:
@@ -34,14 +32,6 @@ def box_mesh(size: tuple[float, float, float]) -> Mesh:
     corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size
     corners[(corners[:, 0] > 0) & (corners[:, 2] < 0), 0] += 0.01
     return Mesh(f"slab {size}", *convex_hull(corners))
-
-
-def piece(name: str, shape: Shape, pose: Pose) -> Collision:
-    return Collision(name, shape, pose, 1.0)
-
-
-def static(name: str, *collisions: Collision) -> Model:
-    return Model(name, Pose(), True, (Link("link", Pose(), None, collisions, ()),), (), (), 1)
 
 
 def platform(
@@ -58,29 +48,6 @@ def platform(
             shape = Box(size) if kind == "box" else box_mesh(size)
             pieces.append(piece(f"{len(pieces)}", shape, frame @ middle))
     return pieces
-
-
-@pytest.fixture(scope="session")
-def drive(world_of, husky, scenario_of) -> Callable[..., RunResult]:
-    """A run of the Husky from the origin of `frame`, over the road and onto what lies ahead."""
-
-    def run(
-        *models: Model, frame: Pose = HERE, robot: Model = husky, speed: float = 0.5, timeout: float = 12.0
-    ) -> RunResult:
-        start = frame @ Pose((0.0, 0.0, 0.14))
-        goal = frame @ Pose((3.0, 0.0, 0.0))
-        x, y, z = start.position
-        scenario = scenario_of(
-            robot={"model": "husky.sdf", "spawn": {"x": x, "y": y, "z": z, "yaw": frame.yaw()}},
-            goal={"x": goal.position[0], "y": goal.position[1], "tolerance": 0.3},
-            controller={"speed": speed, "motor_gain": 300.0},
-            failure={"timeout": timeout},
-        )
-        road = static("road", piece("road", ROAD, frame @ Pose((EDGE - 3.0, 0.0, -0.05))))
-        world: World = replace(world_of(ground=False), models=(road, *models))
-        return Template(world, robot, scenario).run(frozenset(model.name for model in world.models), seed=1)
-
-    return run
 
 
 cut_places = st.lists(st.floats(0.02, 0.98), max_size=4, unique_by=lambda share: round(share, 2))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from ddenv.world import scenario
 from ddenv.world.files.meshes import convex_hull
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere, Terrain
 from ddenv.world.pose import Pose
 from tests.robot.sensing.conftest import lidar_of, loose, scan, still
 from tests.tiers import examples
@@ -179,3 +180,17 @@ def first_met(
         low, high = np.where(in_it, low, middle), np.where(in_it, middle, high)
     begins = at(np.zeros(len(ways)))
     return np.where((depth <= 0) & (begins > 0), high, np.inf), np.minimum(np.abs(depth), np.abs(begins))
+
+
+def test_beams_end_on_the_slope_of_terrain_and_pass_over_what_is_lower():
+    slope = np.broadcast_to(np.linspace(-2.0, 2.0, 9), (5, 9))
+    ground = still("slope", Terrain((8.0, 8.0), slope, "slope"), Pose((1.0, 0.0, 0.0)))
+    lidar = scenario.Lidar(x=0.0, z=0.0, noise=0.0, angle=math.tau, beams=9, range=12.0)
+    # At a height of 1 m the slope is met at x = 3 m, along the diagonals too.
+    found = scan(lidar_of(ground, settings=lidar), Pose((0.0, 0.0, 1.0)))
+    ahead = np.cos(found.angles) > 0.5
+    assert found.ranges[ahead] == pytest.approx(3.0 / np.cos(found.angles[ahead]), abs=1e-6)
+    assert np.isinf(found.ranges[~ahead]).all()
+    # Not from below, and not above its end.
+    assert np.isinf(scan(lidar_of(ground, settings=lidar), Pose((4.0, 0.0, 1.0))).ranges).all()
+    assert np.isinf(scan(lidar_of(ground, settings=lidar), Pose((0.0, 0.0, 2.1))).ranges).all()

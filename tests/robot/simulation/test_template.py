@@ -73,6 +73,14 @@ def test_protected_models_and_the_ground_stay(world_of, husky, scenario_of, box)
     assert template.run(NOTHING, seed=1).failure == "stuck"
 
 
+def test_what_others_depend_on_stays(world_of, husky, scenario_of, box):
+    world = world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1"), box("lamp", "0 9 0.5 0 0 0", "1 1 1"))
+    anchored = Template(replace(world, anchors=frozenset({"wall"})), husky, scenario_of())
+    assert anchored.run(NOTHING, seed=1).failure == "stuck"
+    tied = Template(replace(world, anchors=frozenset({"lamp"}), ties=(("lamp", "wall"),)), husky, scenario_of())
+    assert tied.run(NOTHING, seed=1).failure == "stuck"
+
+
 def test_falls_out_of_a_world_without_ground(world_of, husky, scenario_of, box):
     world = world_of(box("table", "0 0 -0.5 0 0 0", "3 3 1"), ground=False)
     result = Template(world, husky, scenario_of(goal={"x": 50, "y": 0})).run(frozenset({"table"}), seed=1)

@@ -119,7 +119,7 @@ async def test_what_is_shown_starts_what_start_starts(scenarios, asked_by, start
         assert asked_by(shlex.split(shown)) == [session.made(), session.app.screen.run]
 
 
-@pytest.mark.parametrize("given", [[], ["--inside"]])
+@pytest.mark.parametrize("given", [[], ["--inside", "--mesh=hull"]])
 async def test_the_options_of_the_command_line_are_part_of_it(scenarios, tmp_path, given):
     """As click gives them, without any and with a flag."""
     parsed = open_command.make_context("open", ["house.sdf", *given]).params
@@ -135,7 +135,7 @@ async def test_the_options_of_the_command_line_are_part_of_it(scenarios, tmp_pat
         await session.open(world)
         await session.place()
         words = shlex.split(session.told("command"))
-        assert ("--inside" in words) == bool(given), words
+        assert ("--inside" in words and "--mesh hull" in " ".join(words)) == bool(given), words
 
 
 @pytest.mark.screens

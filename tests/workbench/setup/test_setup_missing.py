@@ -109,7 +109,7 @@ def collision(shape):
 
 
 async def test_elements_that_are_not_supported_are_left_out_once_the_user_says_so(tmp_path):
-    hill = f"<model name='hill'><static>1</static><link name='l'>{collision('<heightmap/>')}</link></model>"
+    hill = f"<model name='hill'><static>1</static><link name='l'>{collision('<image/>')}</link></model>"
     hinge = "<joint name='j' type='rope'><parent>l</parent><child>m</child></joint>"
     cart = f"<model name='cart'><link name='l'>{collision('<box><size>1 1 1</size></box>')}</link><link name='m'/>"
     models = f"<include><uri>{SHELF}</uri></include>{hill}{barrel('one', 4)}{cart}{hinge}</model>"
@@ -121,15 +121,15 @@ async def test_elements_that_are_not_supported_are_left_out_once_the_user_says_s
             "? old_shelf",
             "? barrel.dae",
             "? <joint>",
-            "? <heightmap>",
+            "? <image>",
         ]
         assert "2 missing files, 2 unsupported elements without a remedy: press m" in session.told("cost")
         await session.press("m", "home", "down", "down", "enter")
-        assert rows(session)[2:] == ["✓ <joint>  not supported, left out", "? <heightmap>  not supported, left out"]
+        assert rows(session)[2:] == ["✓ <joint>  not supported, left out", "? <image>  not supported, left out"]
         await session.press("m", "a")
         assert [row[0] for row in rows(session)] == ["✓"] * 4
         await session.place(spawn_x="0", goal_x="8")
-        assert "--ignore heightmap --ignore joint" in session.told("command")
+        assert "--ignore image --ignore joint" in session.told("command")
         # In another world it may be the ground.
         other = tmp_path / "other.world"
         other.write_bytes(path.read_bytes())
@@ -137,16 +137,34 @@ async def test_elements_that_are_not_supported_are_left_out_once_the_user_says_s
         assert [row[0] for row in rows(session)] == ["✓", "✓", "?", "?"]
 
 
-async def test_a_file_that_was_found_and_cannot_be_used_says_why(tmp_path):
+async def test_files_that_were_found_and_cannot_be_used_say_why_and_have_the_same_remedies(tmp_path):
     (tmp_path / "barrel.dae").write_text("<COLLADA><")
+    models = tmp_path / "models"
+    for name, content in {
+        "rack": "<sdf version='1.6'><model",
+        "keg": barrel("keg", 2).replace(BARREL, "keg.dae"),
+    }.items():
+        (models / name).mkdir(parents=True)
+        (models / name / "model.sdf").write_text(content if name == "rack" else f"<sdf version='1.6'>{content}</sdf>")
+    (models / "keg" / "keg.dae").write_text("<COLLADA><")
+    includes = "".join(f"<include><uri>model://{name}</uri></include>" for name in ("rack", "keg"))
+    inside = f"{includes}{barrel('one', 2).replace(BARREL, 'barrel.dae')}"
     path = tmp_path / "w.sdf"
-    path.write_text(
-        f"<sdf version='1.6'><world name='w'>{barrel('one', 2).replace(BARREL, 'barrel.dae')}</world></sdf>"
-    )
-    async with Opened() as session:
+    path.write_text(f"<sdf version='1.6'><world name='w'>{inside}</world></sdf>")
+    async with Opened(size=(120, 36)) as session:
         await session.open(path)
-        assert session.screen.query_one(MissingList).border_title == "1 unreadable file (m), 1 without a remedy"
-        assert rows(session)[0].startswith("? barrel.dae  is not a valid DAE file: line 1, column 10: ")
+        assert session.screen.query_one(MissingList).border_title == "3 unreadable files (m), 3 without a remedy"
+        rack, *meshes = rows(session)
+        assert rack.startswith(f"? rack  {models}/rack/model.sdf:1:20: not well-formed XML: ")
+        assert [row.partition(": ")[0] for row in meshes] == [
+            "? keg.dae  is not a valid DAE file",
+            "? barrel.dae  is not a valid DAE file",
+        ]
+        await session.press("m", "home", "w", "down", "a")
+        rack, *meshes = rows(session)
+        assert rack.startswith("✓ rack ") and rack.endswith("; left out")
+        assert all(row.startswith("✓") and "box:1,1,1" in row for row in meshes)
+        assert session.screen.preview.choice.world.names == ("keg", "one")
 
 
 CRATE = (
@@ -200,7 +218,7 @@ async def test_models_come_from_fuel_unless_the_user_stops_that(depot, tmp_path,
         assert ends == ["stopped", "came", "came"]
         assert shape(session, "crate") == Box((2, 1, 1))
         (failed,) = [each.message for each in session.app._notifications]
-        assert "Lamp cannot be fetched: is not in Fuel" in failed
+        assert failed.endswith("Lamp cannot be fetched: is not in Fuel; w leaves it out")
         await session.press("m", "home", "down", "w")
         assert rows(session)[1] == "✓ Lamp  left out"
 

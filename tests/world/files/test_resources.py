@@ -6,7 +6,7 @@ import pytest
 
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.files.meshes import pack
-from ddenv.world.files.resources import Resources
+from ddenv.world.files.resources import MeshPart, Resources
 from ddenv.world.files.roots import search_roots
 
 CUBE = "\n".join(
@@ -34,22 +34,28 @@ def test_stored_gives_the_same_without_the_files(world):
         for center in (False, True)
         for name in ("", "cube")
     ]
-    given = [disk.mesh("cube.obj", world, **way) for way in ways]
+    parts = [MeshPart("cube.obj", world, way["submesh"], way["center"]) for way in ways]
+    given = [disk.mesh(part, convex=way["convex"]) for part, way in zip(parts, ways, strict=True)]
+    pieces = disk.pieces(parts[0], (1.0, 1.0, 1.0), 8)
     text = disk.sdf("model://box", world)
     assert text == (world / "box" / "box.sdf", b"<sdf version='1.6'/>")
     assert disk.sdf("box/box.sdf", world)[1] == text[1]
     shutil.rmtree(world)
     stored = Resources(dict(disk.taken))
     assert stored.sdf("model://box", world) == text
-    for way, mesh in zip(ways, given, strict=True):
-        again = stored.mesh("cube.obj", world, **way)
+    assert stored.pieces(parts[0], (1.0, 1.0, 1.0), 8) == pieces
+    for part, way, mesh in zip(parts, ways, given, strict=True):
+        again = stored.mesh(part, convex=way["convex"])
         assert again == mesh
         assert again.vertices.tobytes() == mesh.vertices.tobytes()
         assert again.faces.tobytes() == mesh.faces.tobytes()
         assert (again.vertices.dtype, again.faces.dtype) == (np.float64, np.uint32)
         assert not again.vertices.flags.writeable and not again.faces.flags.writeable
     assert len({mesh.origin for mesh in given}) == len(ways)
-    for ask in (lambda: stored.sdf("model://none", world), lambda: stored.mesh("bad.obj", world, convex=False)):
+    for ask in (
+        lambda: stored.sdf("model://none", world),
+        lambda: stored.mesh(MeshPart("bad.obj", world), convex=False),
+    ):
         with pytest.raises(Missing):
             ask()
 
@@ -72,20 +78,29 @@ def damaged(packed: bytes):
 
 def test_damaged_bytes(world):
     disk = Resources({}, search_roots((), world))
-    disk.mesh("cube.obj", world, convex=True)
+    disk.mesh(MeshPart("cube.obj", world), convex=True)
     disk.sdf("model://box", world)
     keys = {json.loads(key)[0]: key for key in disk.taken}
     for bad in damaged(disk.taken[keys["mesh"]]):
         with pytest.raises(Unusable, match="damaged"):
-            Resources({keys["mesh"]: bad}).mesh("cube.obj", world, convex=True)
+            Resources({keys["mesh"]: bad}).mesh(MeshPart("cube.obj", world), convex=True)
     for bad in (b"", b"no end", b"\0<sdf/>"):
         with pytest.raises(Unusable, match="damaged"):
             Resources({keys["sdf"]: bad}).sdf("model://box", world)
 
 
+@pytest.mark.parametrize("bad", [b"", b"\1", b"\2\0\0\0\1\0\0\0x", b"\xff\xff\xff\xff", b"\1\0\0\0\5\0\0\0abc"])
+def test_damaged_pieces(world, bad):
+    disk = Resources({}, search_roots((), world))
+    disk.pieces(MeshPart("cube.obj", world), (1.0, 1.0, 1.0), 8)
+    stored = Resources(dict.fromkeys(disk.taken, bad))
+    with pytest.raises(Unusable, match="damaged"):
+        stored.pieces(MeshPart("cube.obj", world), (1.0, 1.0, 1.0), 8)
+
+
 def test_files_of_one_name_are_told_apart_by_content(world):
     disk = Resources({}, search_roots((), world))
-    first = disk.mesh("cube.obj", world, convex=True)
+    first = disk.mesh(MeshPart("cube.obj", world), convex=True)
     (world / "box" / "cube.obj").write_text(CUBE.replace("2", "3"))
-    other = disk.mesh("cube.obj", world / "box", convex=True)
+    other = disk.mesh(MeshPart("cube.obj", world / "box"), convex=True)
     assert first != other

@@ -213,7 +213,7 @@ def test_gravity_of_old_and_new_files(read):
 
 def test_all_files_that_are_nowhere_are_told_at_once(read):
     mesh = "<collision name='c'><geometry><mesh><uri>model://lamp/lamp.dae</uri></mesh></geometry></collision>"
-    with pytest.raises(UserError, match=r"'model://table' was not found .*; also missing: 'model://lamp/lamp.dae'$"):
+    with pytest.raises(UserError, match=r"'model://table' was not found: .*; also missing: 'model://lamp/lamp.dae'$"):
         read(included() + included() + f"<model name='lamp'><static>1</static><link name='l'>{mesh}</link></model>")
 
 
@@ -288,3 +288,14 @@ def test_a_model_of_which_all_is_left_out_is_left_out(read):
     assert "all that it includes is left out" in [note.why for note in world.notes if note.model == "wall"]
     with pytest.raises(UserError, match="has no <link>"):
         read("<model name='m'><plugin name='p' filename='f'/></model>")
+
+
+def test_actors_are_not_simulated_and_nothing_else_is_said_of_them(read, table):
+    (table / "table" / "model.sdf").write_text("<sdf version='1.6'><actor name='walker'/></sdf>")
+    # An actor may have links, which could be touched.
+    world = read(f"{included()}<actor name='a'><link name='l'>{BOX}</link></actor>", model_path=(table,))
+    assert world.models == ()
+    assert [(note.what, note.why) for note in world.notes] == [
+        ("<actor>", "actors are not simulated"),
+        ("<include>", "actors are not simulated"),
+    ]

@@ -10,7 +10,7 @@ from ddenv.world.load import SDF
 from ddenv.world.scenario import Reading
 from ddenv.world.sdf import inside
 from ddenv.world.sdf.read import disk_of, parse_world, read_world
-from ddenv.world.write import without
+from ddenv.world.write import convert, without
 
 BOX = "<geometry><box><size>1 1 1</size></box></geometry>"
 
@@ -98,7 +98,7 @@ def test_what_moves_and_what_others_are_placed_relative_to_stays_whole_and_is_no
     assert world.elements()[:2] == ("cart", "lamp")
     whole = {note.model: note.why for note in world.notes if note.what == "--inside"}
     assert "it can move" in whole["cart"]
-    assert "relative to it" in whole["base"]
+    assert "other models depend on it" in whole["base"]
 
 
 @pytest.fixture
@@ -177,3 +177,19 @@ def test_what_is_left_of_a_real_world_reads_as_before(removed):
     again = parse_world(without(DITCH, frozenset(removed)), DITCH.path)
     left = [one for model in DITCH.models if model.name not in removed for one in model.collisions]
     assert [one for model in again.models for one in model.collisions] == left
+
+
+L = "0 0", "2 0", "2 1", "1 1", "1 2", "0 2"
+CORNER = f"<polyline><height>1</height>{''.join(f'<point>{point}</point>' for point in L)}</polyline>"
+
+
+def test_the_pieces_of_one_collision_are_one_part(read):
+    wall = f"<collision name='wall'><geometry>{CORNER}</geometry></collision>"
+    world = read(house(f"<link name='l'>{shape('collision', 'box')}{wall}</link>"), inside=True)
+    assert [(model.name, len(model.collisions)) for model in world.models] == [("house/box", 1), ("house/wall", 2)]
+    whole = read(house(f"<link name='l'>{wall}</link>"), inside=True)
+    assert [model.name for model in whole.models] == ["house"]
+    assert any("'ddenv world convert' writes its pieces" in note.why for note in whole.notes)
+    text, _ = convert(whole, "meshes")
+    parts = parse_world(text, whole.path, Reading(inside=True))
+    assert parts.elements() == ("house/wall", "house/wall_2")

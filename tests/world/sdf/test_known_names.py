@@ -7,7 +7,7 @@ from ddenv.world.extent import model_bounds
 from ddenv.world.files.resources import Resources
 from ddenv.world.model import Box, Cylinder, Plane
 from ddenv.world.sdf.read import parse_world
-from ddenv.world.sdf.standin import KNOWN_SIZES
+from ddenv.world.sdf.standin import KNOWN_SIZES, MESH_SCALES
 from tests.world.sdf.conftest import world_text
 
 pytestmark = pytest.mark.usefixtures("no_gazebo")
@@ -62,7 +62,8 @@ def guessed(world):
 
 @pytest.mark.parametrize("name", KNOWN_SIZES)
 def test_every_known_model_and_its_mesh_have_its_size(read, name):
-    text, factors = KNOWN_SIZES[name]
+    text = KNOWN_SIZES[name]
+    factors = MESH_SCALES.get(name, (1.0, 1.0, 1.0))
     scale = f"<scale>{' '.join(map(str, factors))}</scale>"
     whole = read(included(f"model://{name}"), stand_ins={"*": "auto"}).models[0]
     mesh, note = guessed(read(lost(f"model://{name}/meshes/x.dae", scale=scale), stand_ins={f"model://{name}": "auto"}))
@@ -132,7 +133,7 @@ def test_auto_leaves_what_is_there(read, tmp_path):
     world = read(lost("a.obj"), stand_ins={"*": "auto", "a.obj": "auto"})
     assert tuple(model_bounds(world.models[0])[1]) == (2, 2, 2)
     assert [note.why for note in world.notes] == [
-        "'a.obj' by its convex hull; contact at the edges of hulls that are no boxes is rough"
+        "'a.obj' by its convex hull; contact at the edges of those that are no boxes is rough"
     ]
 
 

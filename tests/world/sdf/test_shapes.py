@@ -8,9 +8,8 @@ import pytest
 import trimesh
 
 from ddenv.errors import UserError
-from ddenv.world.extent import shape_bounds
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Sphere
-from ddenv.world.pose import Pose
+from ddenv.world.extent import around, shape_bounds, vertices_of
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere
 from ddenv.world.sdf.geometry import DEFAULT_SIZES
 
 
@@ -42,13 +41,16 @@ SDFORMAT = Path("/usr/share/sdformat12/1.9")
 
 
 @pytest.mark.skipif(not SDFORMAT.is_dir(), reason="libsdformat's descriptions are not on this machine")
-@pytest.mark.parametrize(("shape", "child"), DEFAULT_SIZES)
+@pytest.mark.parametrize(
+    ("shape", "child"),
+    [(shape, child) for shape, children in DEFAULT_SIZES.items() for child in children],
+)
 def test_sizes_that_a_file_leaves_out_are_those_of_libsdformat(shape, child):
     file = SDFORMAT / f"{shape}_shape.sdf"
     if not file.exists():
         pytest.skip(f"this libsdformat has no {shape}")
     described = ElementTree.parse(file).find(f"element[@name='{child}']")
-    assert DEFAULT_SIZES[shape, child] == tuple(map(float, described.get("default").split()))
+    assert DEFAULT_SIZES[shape][child] == tuple(map(float, described.get("default").split()))
 
 
 def test_a_shape_without_sizes_has_the_usual_ones(read):
@@ -65,29 +67,81 @@ def test_planes_are_turned_as_their_normal_says(read, normal):
     assert plane.pose.rotate((0, 0, 1)) == pytest.approx(wanted / np.linalg.norm(wanted))
 
 
-def test_a_polyline_stands_on_its_frame_as_its_hull(read):
-    points = "".join(f"<point>{x} {y}</point>" for x, y in ((0, 0), (2, 0), (2, 1), (1, 0.2), (0, 1)))
-    world = read(model(f"<polyline><height>3</height>{points}</polyline>"))
-    shape = shape_of(world)
-    low, high = shape_bounds(shape, Pose())
-    assert (low.tolist(), high.tolist()) == ([0, 0, 0], [2, 1, 3])
-    solid = trimesh.Trimesh(shape.vertices, shape.faces)
-    assert solid.is_watertight and solid.volume == pytest.approx(6)
-    assert "not convex" in world.notes[0].why
+def outline(*corners):
+    return f"<polyline><height>3</height>{''.join(f'<point>{x} {y}</point>' for x, y in corners)}</polyline>"
 
 
-def test_meshes_are_convex_hulls_where_they_collide_and_themselves_where_they_are_seen(read, tmp_path):
-    angle = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]])
-    mesh = _extruded(angle, 1.0)
-    mesh.export(tmp_path / "angle.obj")
-    geometry = "<mesh><uri>angle.obj</uri><scale>1 1 -2</scale></mesh>"
-    link = "<{0} name='c'><geometry>" + geometry + "</geometry></{0}>"
-    both = f"<model name='m'><static>1</static><link name='l'>{link.format('collision')}{link.format('visual')}</link></model>"
-    found = read(both).models[0].links[0]
-    hull, seen = found.collisions[0].shape, found.visuals[0].shape
-    assert isinstance(hull, Mesh)
-    assert trimesh.Trimesh(hull.vertices, hull.faces).volume == pytest.approx(7)
+@pytest.mark.parametrize(
+    ("outlines", "volume"),
+    [
+        (outline((0, 0), (2, 0), (2, 1), (0, 1)), 6),
+        (outline((0, 0), (2, 0), (2, 1), (1, 0.2), (0, 1)), 3.6),
+        # A frame: the inner outline is a hole.
+        (outline((0, 0), (2, 0), (2, 1), (0, 1)) + outline((0.5, 0.2), (1.5, 0.2), (1.5, 0.8), (0.5, 0.8)), 4.2),
+    ],
+)
+def test_polylines_stand_on_their_frame_with_their_notches_and_holes(read, outlines, volume):
+    solids = read(model(outlines)).models[0].collisions
+    low, high = around(shape_bounds(one.shape, one.pose) for one in solids)
+    assert [*low, *high] == pytest.approx([0, 0, 0, 2, 1, 3], abs=1e-5)
+    filled = sum(trimesh.convex.convex_hull(vertices_of(one.shape, 0)[0]).volume for one in solids)
+    assert filled == pytest.approx(volume, rel=1e-5)
+
+
+@pytest.fixture
+def angle(tmp_path):
+    """An L of 1 m width and height, as a mesh that is mirrored and stretched downwards: collision and visual of a link."""
+    outline = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]])
+    _extruded(outline, 1.0).export(tmp_path / "angle.obj")
+
+    def link(inside="", attributes=""):
+        mesh = f"<mesh {attributes}><uri>angle.obj</uri><scale>1 1 -2</scale>{inside}</mesh>"
+        shown = "".join(f"<{tag} name='{tag}'><geometry>{mesh}</geometry></{tag}>" for tag in ("collision", "visual"))
+        return f"<link name='l'>{shown}</link>"
+
+    return link
+
+
+def test_meshes_are_convex_pieces_where_they_collide_and_themselves_where_they_are_seen(read, angle):
+    world = read(f"<model name='m'><static>1</static>{angle()}</model>")
+    found = world.models[0].links[0]
+    sizes = sorted(tuple(round(side, 5) for side in sorted(one.shape.size)) for one in found.collisions)
+    assert sizes == [(1, 1, 2), (1, 2, 2)]
+    assert {one.name for one in found.collisions} == {"collision"}
+    low, high = around(shape_bounds(one.shape, one.pose) for one in found.collisions)
+    assert [*low, *high] == pytest.approx([0, 0, -2, 2, 2, 0])
+    seen = found.visuals[0].shape
     assert trimesh.Trimesh(seen.vertices, seen.faces).volume == pytest.approx(6)
+    assert "by its convex pieces" in world.notes[0].why
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda angle: (angle(attributes="optimization='convex_hull'"), {}),
+        lambda angle: (angle(), {"mesh": "hull"}),
+        lambda angle: (
+            angle(
+                "<convex_decomposition><max_convex_hulls>1</max_convex_hulls></convex_decomposition>",
+                "optimization='convex_decomposition'",
+            ),
+            {},
+        ),
+        # What a joint turns rolls on its hull.
+        lambda angle: (
+            f"{angle()}<link name='k'/><joint name='j' type='continuous'><parent>k</parent><child>l</child>"
+            "<axis><xyz>0 0 1</xyz></axis></joint>",
+            {},
+        ),
+    ],
+    ids=["convex_hull", "reading", "one piece", "wheel"],
+)
+def test_a_mesh_is_its_hull_where_the_file_or_the_user_asks_for_that_or_where_it_is_a_wheel(read, angle, made):
+    inside, options = made(angle)
+    world = read(f"<model name='m'>{inside}</model>", **options)
+    [collision] = next(link for link in world.models[0].links if link.name == "l").collisions
+    hull = collision.shape
+    assert trimesh.Trimesh(hull.vertices, hull.faces).volume == pytest.approx(7)
     assert hull.vertices[:, 2].min() == pytest.approx(-2)
 
 

@@ -13,14 +13,13 @@ import numpy as np
 import trimesh
 
 from ddenv.arrays import Floats
+from ddenv.world.files.boxes import box_of
 from ddenv.world.files.meshes import convex_hull
-from ddenv.world.model import Box, Cylinder, Mesh, Shape
+from ddenv.world.model import Cylinder, Mesh, Shape
 from ddenv.world.pose import HERE, Pose, pointing, vector
 
 LONGEST = 2.0  # of a piece along any axis of its mesh, m
 MOST_PIECES = 512  # of one mesh: of a larger one the pieces are longer
-# A mesh that leaves at most this share of the box around it empty is that box.
-EMPTY = 5e-4
 # A prism with at least this many sides is a cylinder if its corners lie on a circle within this share of the radius.
 SIDES = 12
 ROUND = 0.01
@@ -29,21 +28,10 @@ ROUND = 0.01
 @cache
 def pieces(mesh: Mesh) -> list[tuple[Shape, Pose]]:
     """The shapes that stand for a convex mesh, in its frame."""
-    known = _as_box(mesh) or _as_cylinder(mesh)
+    known = box_of(mesh) or _as_cylinder(mesh)
     if known is not None:
         return [known]
     return [(piece, HERE) for piece in _cut(mesh)]
-
-
-def _as_box(mesh: Mesh) -> tuple[Shape, Pose] | None:
-    """The box that `mesh` is; None if it is another shape."""
-    if len(mesh.vertices) != 8:
-        return None
-    to_box, size = trimesh.bounds.oriented_bounds(mesh.vertices)
-    if _solid(mesh).volume < (1 - EMPTY) * math.prod(size):
-        return None
-    turned = trimesh.transformations.quaternion_from_matrix(to_box)
-    return Box(vector(size)), Pose(vector(to_box[:3, 3]), tuple(turned.tolist())).inverse()
 
 
 def _solid(mesh: Mesh) -> trimesh.Trimesh:

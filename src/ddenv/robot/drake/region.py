@@ -56,6 +56,10 @@ class Region:
         starts, ends = np.vstack([self.starts, place]), np.vstack([self.ends, place])
         return Region(starts, ends, np.append(self.widths, times * WIDTH))
 
+    def reaches(self, place: Point, radius: float) -> bool:
+        """Whether any place within `radius` (m) of `place` (m) is in the region."""
+        return bool(self._depths(np.array([place]))[0] + radius >= 0)
+
     def far(self, models: Iterable[Model]) -> frozenset[str]:
         """The names of those among `models` that never move and lie outside; none if there are few shapes in all."""
         static = [model for model in models if model.static]

@@ -15,16 +15,26 @@ from itertools import pairwise
 
 import numpy as np
 
-from ddenv.arrays import Floats, Integers
+from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.text import Names
 from ddenv.world.extent import shape_bounds
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere, World, still_links
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere, Terrain, World, still_links
 from ddenv.world.pose import HERE, Pose, Vector, vector
 from ddenv.world.scenario import Lidar
+from ddenv.world.terrain import bilinear
 
 # The kinds of shapes that are cast in the same way, in the order in which they are sorted.
 CUBE, BALL, TUBE, PILL, HULL = KINDS = range(5)
-KIND_OF = {Box: CUBE, Plane: CUBE, Sphere: BALL, Ellipsoid: BALL, Cylinder: TUBE, Capsule: PILL, Mesh: HULL}
+KIND_OF = {
+    Box: CUBE,
+    Plane: CUBE,
+    Sphere: BALL,
+    Ellipsoid: BALL,
+    Cylinder: TUBE,
+    Capsule: PILL,
+    Mesh: HULL,
+    Terrain: HULL,
+}
 # Where each kind begins in a sorted array of kinds, and where the last one ends.
 BOUNDS = np.arange(len(KINDS) + 1)
 # A shape is skipped only if it is out of the way by at least this margin (m, rad, and as a part of the range), which is far
@@ -41,7 +51,7 @@ class Shapes:
     `centers` (3, N) m are in the world frame. `frames` (3, 3, N) 1/m turn a vector along the world's axes (first index) into one
     along the shape's own axes (second index), in which the shape lies between -1 and 1. `squares` (3, N) m^2 are the squares of
     half the sizes, `reaches` (N,) m upper bounds of the distance from the center. `lengths` (N,) are the half lengths of capsules
-    in units of their radius, `facets` the faces of meshes by the number of the shape.
+    in units of their radius, `facets` the faces of meshes, and the surfaces of terrain, by the number of the shape.
     """
 
     kinds: Integers
@@ -50,7 +60,7 @@ class Shapes:
     squares: Floats
     reaches: Floats
     lengths: Floats
-    facets: Mapping[int, Facets]
+    facets: Mapping[int, Facets | Relief]
 
     @cached_property
     def firsts(self) -> list[int]:
@@ -109,9 +119,9 @@ class Obstacles:
             reaches=np.sqrt(squares.sum(axis=0)) + SPARE,
             lengths=sizes[:, 2] / sizes[:, 0],
             facets={
-                number: Facets.of(shape, np.array(_extent(shape)[0]), sizes[number])
+                number: kind.of(shape, np.array(_extent(shape)[0]), sizes[number])
                 for number, shape in enumerate(shapes)
-                if isinstance(shape, Mesh)
+                if (kind := CURVED.get(type(shape))) is not None
             },
         )
         names = world.names
@@ -128,6 +138,8 @@ def _extent(shape: Shape) -> tuple[Vector, Vector]:
 
 # Added to divisors that may be 0: a beam along a face then crosses it, but far away. It is too small to change anything else.
 NEVER = 1e-200
+# In how many steps a beam is followed along terrain.
+FEWEST_STEPS, MOST_STEPS = 20, 200
 SHORTEST = 1e-9  # the minimum half length of a capsule's straight part, as a part of its radius
 
 Interval = tuple[Floats, Floats]
@@ -203,7 +215,7 @@ class Facets:
         offsets = (normals @ corners.T).max(axis=1)
         return cls(corners.T.copy(), faces.T.copy(), normals.T.copy(), offsets)
 
-    def cast(self, start: Floats, way: Floats, normal: Floats) -> Interval:
+    def cast(self, start: Floats, way: Floats, normal: Floats, _range: float) -> Interval:
         """Where beams from `start` (3,) along `way` (3, P), orthogonal to `normal` (3,), enter and leave."""
         corners = self.corners - start[:, None]
         heights = (normal[0] * corners[0] + normal[1] * corners[1] + normal[2] * corners[2])[self.faces]
@@ -216,6 +228,38 @@ class Facets:
         crossing = -above / rise
         enter = np.where(rise < 0, crossing, -np.inf).max(axis=0)
         return enter, np.where(rise > 0, crossing, np.inf).min(axis=0)
+
+
+@dataclass(frozen=True)
+class Relief:
+    """Terrain in the frame in which it lies between -1 and 1: all that is below `heights` (R, C). Its cells are `cell` m wide."""
+
+    heights: Floats
+    cell: float
+
+    @classmethod
+    def of(cls, terrain: Terrain, middle: Floats, half: Floats) -> Relief:
+        """The relief of terrain, whose box has its centre at `middle` (3,) m and half the size `half` (3,) m."""
+        counts = np.array(terrain.heights.shape[::-1]) - 1
+        return cls((terrain.heights - middle[2]) / half[2], float((np.array(terrain.size) / counts).min()))
+
+    def cast(self, start: Floats, way: Floats, _normal: Floats, reach: float) -> Interval:
+        """Where beams from `start` (3,) along `way` (3, P), which are `reach` m long, meet the surface; they do not leave it."""
+        along = np.linspace(0.0, reach, int(np.clip(reach / self.cell, FEWEST_STEPS, MOST_STEPS)))
+        x, y, z = start[:, None, None] + along[:, None] * way[:, None]
+        rows, columns = self.heights.shape
+        above = z - bilinear(self.heights, (y + 1) / 2 * (rows - 1), (x + 1) / 2 * (columns - 1))
+        under: Booleans = above <= 0
+        first = under.argmax(axis=0)
+        beam = np.arange(way.shape[1])
+        before, after = above[first - 1, beam], above[first, beam]
+        enter = along[first] - along[1] * after / (after - before + NEVER)
+        # A beam that begins below the surface does not meet it, nor does one that comes from below the terrain's edge.
+        met = under.any(axis=0) & (before > 0)
+        return np.where(met, enter, np.inf), np.where(met, np.inf, -np.inf)
+
+
+CURVED: dict[type, type[Facets] | type[Relief]] = {Mesh: Facets, Terrain: Relief}
 
 
 TURNS = np.array([[-math.tau], [0.0], [math.tau]])  # directions that differ by a full turn are the same
@@ -309,5 +353,5 @@ def _cross(fan: Fan, shapes: Shapes, local: Floats, counts: Integers, beams: Int
     for number, facets in shapes.facets.items():
         part = slice(ends[number], ends[number + 1])
         normal = local[3, :, number] * shapes.squares[:, number]
-        enter[part], leave[part] = facets.cast(local[0, :, number], way[:, part], normal)
+        enter[part], leave[part] = facets.cast(local[0, :, number], way[:, part], normal, fan.range)
     return enter, leave

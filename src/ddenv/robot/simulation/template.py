@@ -14,6 +14,7 @@ from ddenv.robot.controllers import BUILT_IN, Listener, controllers
 from ddenv.robot.drake.plant import build
 from ddenv.robot.drake.region import LeftRegion, Region
 from ddenv.robot.drake.run_context import RunContext
+from ddenv.robot.drake.terrain_boxes import has_terrain, with_boxes
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import Ends, Progress, RunResult
@@ -27,7 +28,7 @@ from ddenv.robot.simulation.run import Run
 from ddenv.robot.simulation.taking_part import ENDLESS, Hull, Reached, solids
 from ddenv.world.drive import find_drive
 from ddenv.world.extent import with_ground_boxes
-from ddenv.world.model import Model, World, is_ground
+from ddenv.world.model import Model, World
 from ddenv.world.placement import spawn_pose
 from ddenv.world.pose import Point
 from ddenv.world.scenario import Scenario
@@ -55,9 +56,7 @@ class Template:
         self._drive = find_drive(robot, scenario.robot.wheels)
         self._controllers = controllers(scenario.controller, scenario.folder)
         names = frozenset(world.names)
-        grounds = frozenset(model.name for model in world.models if is_ground(model))
-        fixed = set(scenario.protected)
-        self._always = grounds | {model.name for model in world.models if fixed & {model.name, model.inside}}
+        self._always = names - frozenset(world.elements(scenario.protected))
         self._clock = Clock.of(scenario)
         self._setup = setup_of(robot, self._drive, self._clock, scenario)
         self._obstacles = Obstacles.of(world) if scenario.sensors.lidar else None
@@ -72,6 +71,7 @@ class Template:
         # used beside such models, 23 of 274 implied tests differed.)
         self.slices = scenario.controller.use in BUILT_IN and not any(model.self_collide for model in world.models)
         moving = [model for model in world.models if not model.static]
+        self._way = Region.of((spawn.x, spawn.y), (goal.x, goal.y), ())
         self._surround(Region.of((spawn.x, spawn.y), (goal.x, goal.y), moving))
         self._build(names)
 
@@ -104,13 +104,17 @@ class Template:
     def _surround(self, region: Region) -> None:
         """From the next `_build` on, the plant has nothing outside `region` that never moves."""
         self._region = region
-        self._far = region.far(self._solid.models) if self._reach < ENDLESS else frozenset()
+        bounded = None if self._reach >= ENDLESS else region
+        models = self._solid.models
+        self._far = frozenset() if bounded is None else region.far(models)
+        self._grounds = {one.name: with_boxes(one, bounded, self._way) for one in models if has_terrain(one)}
 
     def _build(self, names: frozenset[str]) -> None:
         """Builds the plant with the models `names`. Everything else stays that of the whole world."""
         self.names = names
-        near = tuple(model for model in self._solid.models if model.name in names - self._far)
-        world, scenario = replace(self._solid, models=near), self._scenario
+        near = [model for model in self._solid.models if model.name in names - self._far]
+        near = [self._grounds.get(model.name, model) for model in near]
+        world, scenario = replace(self._solid, models=tuple(near)), self._scenario
         try:
             built = build(world, self._robot, self._drive, scenario.simulation, scenario.controller.motor_gain)
         except (ValueError, RuntimeError, SystemExit) as error:
@@ -120,7 +124,8 @@ class Template:
                 f"robot '{self._robot.name}': its first link must be free to move, not joined to the world or another link"
             )
         at = spawn_pose(scenario.robot.spawn) @ self._robot.pose.inverse()
-        self.context = RunContext(built, at, self._clock, self._whole.floor, self._region if self._far else None)
+        watched = self._region if self._far or self._grounds else None
+        self.context = RunContext(built, at, self._clock, self._whole.floor, watched)
         self.rehearsals = Rehearsals(self.repertoire, self.context)
 
     def run(

@@ -14,6 +14,7 @@ import numpy as np
 from ddenv.evidence.slices import in_last
 from ddenv.map.cells import Signs
 from ddenv.map.colors import HUES
+from ddenv.map.footprints import FLOOR_AREA
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import EMPTY
 from ddenv.runfile.state import partition_letter
@@ -111,7 +112,9 @@ def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
 @lru_cache(maxsize=4)
 def _known(prints: tuple[Footprint, ...]) -> tuple[Names, np.ndarray]:
     areas = np.array([each.area for each in prints])
-    return tuple(each.name for each in prints), areas > FLOOR_FACTOR * (float(np.median(areas)) if len(areas) else 0.0)
+    large = areas > max(FLOOR_AREA, FLOOR_FACTOR * float(np.median(areas))) if len(areas) else areas > 0
+    hollow = np.array([each.hollow for each in prints], dtype=bool)
+    return tuple(each.name for each in prints), large & ~hollow
 
 
 def _signs(names: Names, kinds: np.ndarray, parts: np.ndarray, who: Kept) -> Signs:

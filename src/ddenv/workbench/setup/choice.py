@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -51,7 +52,7 @@ class Choice:
             return read_parts(run)[2]
 
     @cached_property
-    def clearance(self) -> float:
+    def height_above(self) -> float:
         """How far the robot's frame is above the ground, m: as in the scenario, or else as the robot's shapes need."""
         from ddenv.world.extent import model_bounds
 
@@ -69,15 +70,22 @@ class Choice:
     def spawn_height(self, x: float, y: float) -> float | None:
         """The z of a spawn at (x, y), m, to the mm; None where there is no ground."""
         top = self._ground(x, y)
-        return None if top is None else round(top + self.clearance, 3)
+        return None if top is None else round(top + self.height_above, 3)
 
     def _ground(self, x: float, y: float) -> float | None:
         """The highest top of the boxes around the shapes at (x, y), m. None where there is nothing."""
+        import numpy as np
+
         from ddenv.world.extent import shape_bounds
-        from ddenv.world.model import Plane
+        from ddenv.world.model import Plane, Terrain
+        from ddenv.world.terrain import height_above
 
         tops = []
-        for collision in (each for model in self.world.models for each in model.collisions):
+        for collision in self.world.collisions:
+            if isinstance(collision.shape, Terrain):
+                top = -height_above(collision.shape, collision.pose, np.array([[x, y, 0.0]]))
+                tops += [top] if math.isfinite(top) else []
+                continue
             if isinstance(collision.shape, Plane):
                 tops.append(float(collision.pose.position[2]))
                 continue

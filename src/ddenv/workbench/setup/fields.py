@@ -156,12 +156,11 @@ class OptionsForm(Vertical):
         near = [] if widget is None else [each.id for each in (widget, widget.parent) if each is not None]
         id = next((each for each in near if each in FIELDS or each in KINDS), "") or ""
         pair, algorithm = self.method
-        partitioning, _, prioritization = pair.partition("/")
         panel = self.query_one("#explained")
         if widget is panel:
             return
         kind = next((kind for kind in KINDS if kind == id), KINDS[0])
-        name = {"partitioning": partitioning, "prioritization": prioritization}.get(kind, algorithm)
+        name = chosen(algorithm, pair)[kind]
         title, words, warning = f"{kind} {plain(name)}", paragraph(kind, name), note(kind, algorithm)
         if id in FIELDS:
             one = FIELDS[id]

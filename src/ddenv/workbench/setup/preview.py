@@ -43,6 +43,9 @@ REMEDIES = {
     "drop": "lower the spawn's z",
     "goal": "move the goal",
     "inside": "move one model, or make both static",
+    "gravity": "let it point down",
+    "wheels": "see where its wheels are",
+    "passage": "move the start or the goal",
 }
 KEYS = {"start": "s", "heading": "h", "goal": "g"}
 ASKS = {
@@ -204,6 +207,7 @@ class Preview(Vertical):
     def _fetch(self, choice: Choice) -> None:
         """Downloads from Fuel what a world lacks; the user may look at others meanwhile."""
         from ddenv.runs.fetching import fetch_missing
+        from ddenv.world.sdf.read import parse_world
 
         needs = choice.settings
 
@@ -219,7 +223,14 @@ class Preview(Vertical):
             call_if_open(self, partial(self.notify, timeout=10, markup=False), plain(words))
 
         try:
-            fetch_missing(needs.world, needs.reading, lambda model: partial(arrived, model.name), tell)
+            fetch_missing(
+                needs.world,
+                needs.reading,
+                parse_world,
+                show=lambda model: partial(arrived, model.name),
+                tell=tell,
+                advice="w leaves it out",
+            )
         except UserError as error:
             tell(str(error))
         self._fetching = None
@@ -317,8 +328,9 @@ class Preview(Vertical):
         with suppress(UserError):
             if spawn is not None and (robot := choice.robot):
                 start = Spawn(x=spawn[0], y=spawn[1], z=spawn[2], yaw=spawn[3])
-                found = tuple(notes_on_start(choice.world, robot, start, (goal[0], goal[1]) if goal else None))
-                if (inside := stands_inside(choice.world, robot, start)) is not None:
+                end = choice.settings.goal.model_copy(update={"x": goal[0], "y": goal[1]}) if goal else None
+                found = tuple(notes_on_start(choice.world, robot, start, end))
+                if (inside := stands_inside(choice.world, robot, start, end)) is not None:
                     why, place = inside
                     found, free = (("start", why), *found), None if place is None else (place.x, place.y)
         if not worker.is_cancelled:

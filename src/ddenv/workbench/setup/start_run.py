@@ -114,7 +114,8 @@ def command_words(choice: Choice, asked: Scenario, jobs: int, name: str = "") ->
         if option == "inside":
             words += ["--inside"] if values else []
             continue
-        for value in values:
+        given = [values] if isinstance(values, str) else values or ()
+        for value in given:
             words += [f"--{option.replace('_', '-')}", str(value.absolute()) if isinstance(value, Path) else str(value)]
     if jobs != processor.usable_cores():
         words += ["--jobs", str(jobs)]

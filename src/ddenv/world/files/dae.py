@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
-from ddenv.world.access import Unusable, xml_root
 from ddenv.world.files.triangles import Part, check_count, used_part
-from ddenv.world.tinyxml import Element
+from ddenv.world.tinyxml import Element, parse_xml
 
 # What the URL of each instance names.
 TARGETS = {
@@ -32,12 +32,10 @@ MOST_WEIGHT = 400_000_000
 def read_dae(data: bytes) -> list[Part]:
     """Every instance of every geometry in the scene, in m, named by its node, its geometry and their ids.
 
-    Dangling references are skipped, as in Gazebo. Raises ValueError, and RecursionError if a node contains itself.
+    Dangling references are skipped, as in Gazebo. Raises NotXml and ValueError, and RecursionError
+    if a node contains itself.
     """
-    try:
-        root = xml_root(data)
-    except Unusable as error:
-        raise ValueError(str(error)) from None
+    root = parse_xml(data, Path())
     if root.tag != "COLLADA":
         raise ValueError(f"its root is <{root.tag[:60]}>, not <COLLADA>")
     document = _Document(root)

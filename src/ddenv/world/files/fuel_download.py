@@ -9,18 +9,16 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import shutil
-import ssl
 import stat
 import tempfile
 import time
 import zipfile
 import zlib
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from http.client import HTTPException, HTTPResponse
 from lzma import LZMAError
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from urllib.error import HTTPError, URLError
 from urllib.request import (
     HTTPDefaultErrorHandler,
@@ -94,8 +92,7 @@ def download(model: FuelModel, shown: Shown) -> tuple[Path, Archive | None]:
 
 def _receive(model: FuelModel, file: Path, shown: Shown) -> Archive:
     """Writes what the server sends to `file`."""
-    owner, name = quoted(model.owner), quoted(model.name)
-    url = f"https://{HOSTS[0]}/1.0/{owner}/{model.kind}/{name}/{model.version or 'tip'}/{name}.zip"
+    url = f"{replace(model, version=model.version or 'tip').url}/{quoted(model.name)}.zip"
     with _opener().open(Request(url, headers={"User-Agent": "ddenv"}), timeout=TIMEOUT) as response:
         version = response.headers.get(VERSION) or model.version
         if not re.fullmatch("[1-9][0-9]{0,8}", version) or model.version not in ("", version):
@@ -110,14 +107,14 @@ def _opener() -> OpenerDirector:
     """Opens https alone: a redirection to anything else fails, too."""
     opener = OpenerDirector()
     for handler in (
-        ProxyHandler(),
-        HTTPSHandler(context=ssl.create_default_context()),
-        HTTPRedirectHandler(),
-        HTTPDefaultErrorHandler(),
-        HTTPErrorProcessor(),
-        UnknownHandler(),
+        ProxyHandler,
+        HTTPSHandler,
+        HTTPRedirectHandler,
+        HTTPDefaultErrorHandler,
+        HTTPErrorProcessor,
+        UnknownHandler,
     ):
-        opener.add_handler(handler)
+        opener.add_handler(handler())
     return opener
 
 
@@ -156,27 +153,19 @@ def _unpack(file: Path, folder: Path) -> None:
                 raise Unusable(f"has more than {MOST_FILES} files or {FILES_LIMIT / 1e6:.0f} MB, the maximum")
             if not any(entry.filename == "model.config" or entry.filename.endswith(SDF_ENDINGS) for entry in entries):
                 raise Unusable("the zip file that the server sent holds neither model.config nor an SDF file")
-            for entry in entries:
-                target = folder / _place(entry)
-                if entry.is_dir():
-                    target.mkdir(parents=True, exist_ok=True)
-                    continue
-                target.parent.mkdir(parents=True, exist_ok=True)
-                with zipped.open(entry) as source, target.open("xb") as written:
-                    shutil.copyfileobj(source, written)
+            for entry in filter(_leads_out, entries):
+                what = f"'{entry.filename[:80]}', which leads out of its folder"
+                raise Unusable(f"the zip file that the server sent holds {what}")
+            zipped.extractall(folder)
     except DAMAGED as error:
         raise Unusable(f"the zip file that the server sent is damaged: {error}") from None
 
 
-def _place(entry: zipfile.ZipInfo) -> PurePosixPath:
-    """Where a file of a zip file goes, relative to its folder. Raises Unusable for a link, and for a place outside."""
-    place = PurePosixPath(entry.filename)
+def _leads_out(entry: zipfile.ZipInfo) -> bool:
+    """Whether a file of a zip file is a link, or would be outside of its folder."""
+    name = entry.filename
     is_link = stat.S_ISLNK(entry.external_attr >> 16)
-    if is_link or place.is_absolute() or ".." in place.parts or "\\" in entry.filename:
-        raise Unusable(
-            f"the zip file that the server sent holds '{entry.filename[:80]}', which leads out of its folder"
-        )
-    return place
+    return is_link or name.startswith("/") or ".." in name.split("/") or "\\" in name
 
 
 def _reason(error: OSError | HTTPException) -> str:

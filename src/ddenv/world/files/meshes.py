@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ddenv.text import truncated
 from ddenv.world.access import Unusable, read
 from ddenv.world.files.dae import read_dae
 from ddenv.world.files.gltf import read_gltf
@@ -34,6 +35,9 @@ _MAGIC = b"ddmesh1\0"
 # Begins a mesh that is drawn as its hull, since it has more than `MOST_DRAWN` faces.
 _MAGIC_HULL = b"ddmesh1h"
 _HEADER = struct.Struct("<8sIII")
+_COUNT = struct.Struct("<I")
+# Vertices (N, 3) m, and outward faces (M, 3) as their indices.
+Surface = tuple[np.ndarray, np.ndarray]
 
 
 def read_parts(path: Path) -> list[Part]:
@@ -65,24 +69,18 @@ def read_parts(path: Path) -> list[Part]:
 
 
 def _line(text: str) -> str:
-    text = " ".join(text.split())
-    return text if len(text) <= 200 else text[:199] + "…"
+    return truncated(" ".join(text.split()), 200)
 
 
 def build(parts: list[Part], submesh: str = "", center: bool = False, convex: bool = False) -> bytes:
     """The mesh of all `parts`, or of those called `submesh`, packed.
 
-    `center` moves the middle of its bounding box to the origin. A `convex` mesh, and one of more than `MOST_DRAWN` faces, is
-    replaced by its hull. Raises Unusable.
+    It is centred as by `surface_of`. A `convex` mesh, and one of more than `MOST_DRAWN` faces, is replaced by its hull.
+    Raises Unusable.
     """
+    vertices, faces = surface_of(parts, submesh, center)
+    too_fine = not convex and len(faces) > MOST_DRAWN
     try:
-        vertices, faces = joined(chosen(parts, submesh))
-        _check(vertices, faces)
-        if center:
-            vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-        # Adding zero makes -0.0 the same as 0.0.
-        vertices = vertices + 0.0
-        too_fine = not convex and len(faces) > MOST_DRAWN
         if convex or too_fine:
             vertices, faces = convex_hull(vertices)
         else:
@@ -92,6 +90,22 @@ def build(parts: list[Part], submesh: str = "", center: bool = False, convex: bo
     except ValueError as error:
         raise Unusable(_line(str(error))) from None
     return pack(vertices, faces, simplified=too_fine)
+
+
+def surface_of(parts: list[Part], submesh: str, center: bool) -> Surface:
+    """Vertices (N, 3) m and faces (M, 3) of all `parts`, or of those called `submesh`. Raises Unusable.
+
+    `center` moves the middle of its bounding box to the origin.
+    """
+    try:
+        vertices, faces = joined(chosen(parts, submesh))
+        _check(vertices, faces)
+    except ValueError as error:
+        raise Unusable(_line(str(error))) from None
+    if center:
+        vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    # Adding zero makes -0.0 the same as 0.0.
+    return vertices + 0.0, faces
 
 
 def _check(vertices: np.ndarray, faces: np.ndarray) -> None:
@@ -136,6 +150,26 @@ def unpack(name: str, packed: bytes) -> Mesh:
     return Mesh(f"{name} {digest}", vertices, faces, packed.startswith(_MAGIC_HULL))
 
 
+def pack_pieces(pieces: list[Surface]) -> bytes:
+    """Their number, the size of each, and each as `pack` gives it."""
+    packed = [pack(*piece) for piece in pieces]
+    sizes = [len(packed), *map(len, packed)]
+    return b"".join([*map(_COUNT.pack, sizes), *packed])
+
+
+def unpack_pieces(name: str, packed: bytes) -> list[Mesh]:
+    """The packed pieces, each as `unpack` gives it. Raises Unusable for damaged bytes."""
+    sizes = [size for (size,) in _COUNT.iter_unpack(packed[: len(packed) // _COUNT.size * _COUNT.size])]
+    if not sizes or sizes[0] >= len(sizes):
+        raise Unusable("its stored mesh is damaged")
+    start = _COUNT.size * (1 + sizes[0])
+    pieces = []
+    for number, size in enumerate(sizes[1 : 1 + sizes[0]]):
+        pieces.append(unpack(f"{name} {number}", packed[start : start + size]))
+        start += size
+    return pieces
+
+
 # Maximum number of vertices: a finer hull only makes every time step slower.
 MOST_VERTICES = 256
 # A hull thinner than `THIN_RATIO` of its size is thickened to `THICKNESS` m, or to `THICKNESS_RATIO` of a large size.
@@ -147,7 +181,7 @@ MANY_POINTS = 300_000
 CHUNK = 20_000  # points at a time
 
 
-def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def convex_hull(points: np.ndarray) -> Surface:
     """Vertices (maximum `MOST_VERTICES`) and outward faces of the convex hull of `points` (N, 3), m.
 
     Points in one plane, line or place get a hull that is 1 mm thick. Raises ValueError if there is no hull.

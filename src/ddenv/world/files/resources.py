@@ -10,23 +10,46 @@ import json
 import os
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
+import numpy as np
+
+from ddenv.arrays import Floats
 from ddenv.text import first_of
 from ddenv.world.access import Missing, Unusable, folders_of, is_file, is_folder, read, reason, xml_root
 from ddenv.world.files.fuel import GAZEBO, FuelModel, cached, caches, hosts, in_fuel, newest, refuse_link_out
-from ddenv.world.files.meshes import build, read_parts, unpack
+from ddenv.world.files.heights import read_heights, unpack_heights
+from ddenv.world.files.meshes import build, read_parts, surface_of, unpack, unpack_pieces
 from ddenv.world.files.roots import absolute, source_of
 from ddenv.world.files.triangles import Part
 from ddenv.world.model import Found, Mesh
+from ddenv.world.pose import Vector
 from ddenv.world.tinyxml import Element
 
 SDF_LIMIT = 50_000_000  # bytes of a file
 # Of the parts of mesh files that are kept in case that they are used again, bytes.
 MOST_KEPT = 200_000_000
+
+
+@dataclass(frozen=True)
+class MeshPart:
+    """A mesh file, or its part called `submesh`, named by a URI in a file of the folder `base`.
+
+    `center` moves the middle of its bounding box to the origin.
+    """
+
+    uri: str
+    base: Path
+    submesh: str = ""
+    center: bool = False
+
+    def key(self, kind: str, *more: Any) -> str:
+        """The name of what is made of it, for `Resources.taken`."""
+        return json.dumps([kind, self.uri, str(self.base), self.submesh, self.center, *more])
 
 
 class Resources:
@@ -39,9 +62,12 @@ class Resources:
 
     def __init__(self, taken: Mapping[str, bytes], folders: Mapping[Path, str] | None = None) -> None:
         self.taken = dict(taken)
-        self._folders = folders
+        self._reads_disk = folders is not None
+        self._folders = folders or {}
         self._files: dict[str, tuple[Path, bytes]] = {}
         self._meshes: dict[str, Mesh] = {}
+        self._pieces: dict[str, list[Mesh]] = {}
+        self._heights: dict[str, Floats] = {}
         self._failed: dict[str, Missing | Unusable] = {}
         # Collisions and visuals use the same files, and different parts of them; the longest known first.
         self._parts_of: dict[Path, list[Part]] = {}
@@ -55,45 +81,74 @@ class Resources:
         self.asked[uri, base] = None
         key = json.dumps(["sdf", uri, str(base)])
         if key not in self._files:
-            path, end, text = self._bytes(key, lambda folders: self._sdf(uri, base, folders)).partition(b"\0")
+            path, end, text = self._bytes(key, lambda: self._sdf(uri, base)).partition(b"\0")
             if not end or not path:
                 raise Unusable("its stored file is damaged")
             self._files[key] = Path(path.decode("utf-8", "surrogateescape")), text
         return self._files[key]
 
-    def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
-        """A mesh file in m, or its part called `submesh`; `center` moves the middle of its bounding box to the origin."""
-        self.asked[uri, base] = None
-        way: list[Any] = [submesh, center, convex]
-        key = json.dumps(["mesh", uri, str(base), *way])
+    def mesh(self, part: MeshPart, *, convex: bool) -> Mesh:
+        """A mesh in m; the convex hull of it if it is to be `convex`."""
+        self.asked[part.uri, part.base] = None
+        key = part.key("mesh", convex)
         if key not in self._meshes:
-            packed = self._bytes(key, lambda folders: self._mesh(uri, base, folders, *way))
-            self._meshes[key] = unpack(json.dumps([uri, *way]), packed)
+            packed = self._bytes(key, lambda: build(self._parts(part), part.submesh, part.center, convex))
+            self._meshes[key] = unpack(json.dumps([part.uri, part.submesh, part.center, convex]), packed)
         return self._meshes[key]
+
+    def pieces(self, part: MeshPart, scale: Vector, most: int) -> list[Mesh]:
+        """The convex pieces of a mesh, in m and times `scale`, at most `most`; a mesh that is convex is a single one."""
+        key = part.key("pieces", scale, most)
+        if key not in self._pieces:
+            packed = self._bytes(key, lambda: _cut(self._parts(part), part, scale, most))
+            self._pieces[key] = unpack_pieces(key, packed)
+        return self._pieces[key]
+
+    def heights(self, part: MeshPart) -> Floats:
+        """The heights (R, C) in an image, as a share of the greatest; the first row has the least y."""
+        self.asked[part.uri, part.base] = None
+        return self._unpacked(part.key("heightmap"), lambda: read_heights(self._find(part.uri, part.base, model=False)))
+
+    def ground(self, part: MeshPart, scale: Vector) -> Floats:
+        """The heights (R, C) of a mesh that is ground, times `scale`, as a share of those of the box around it."""
+        key = part.key("ground", scale)
+        if key not in self.taken and not self._reads_disk:
+            raise Unusable("was no ground when the world was read")
+        return self._unpacked(key, lambda: _heights_of(self._parts(part), part, scale))
+
+    def _unpacked(self, key: str, from_disk: Callable[[], bytes]) -> Floats:
+        if key not in self._heights:
+            self._heights[key] = unpack_heights(self._bytes(key, from_disk))
+        return self._heights[key]
 
     def config_fault(self, folder: Path) -> str:
         """Why the model.config in the folder of a model cannot be read, so that its model.sdf is taken; empty if it can."""
         key = json.dumps(["config", str(folder)])
-        if key not in self.taken and self._folders is not None and (fault := _config_fault(folder)):
-            self.taken[key] = fault.encode()
+        if key not in self.taken and self._reads_disk:
+            try:
+                _model_config(folder)
+            except Unusable as error:
+                self.taken[key] = str(error).encode()
+            except Missing:
+                return ""
         return self.taken.get(key, b"").decode("utf-8", "replace")
 
     def rename(self, uri: str, folder: str, new: str, new_folder: str) -> None:
-        """Makes the meshes called `uri` in files of `folder` also known as `new` in files of `new_folder`."""
+        """Makes the meshes and images called `uri` in files of `folder` also known as `new` in files of `new_folder`."""
         for key, content in list(self.taken.items()):
-            kind, *names, submesh, center, convex = [*json.loads(key), "", False, False][:6]
-            if [kind, *names] == ["mesh", uri, folder]:
-                self.taken[json.dumps([kind, new, new_folder, submesh, center, convex])] = content
+            kind, *names = json.loads(key)
+            if kind in ("mesh", "pieces", "heightmap", "ground") and names[:2] == [uri, folder]:
+                self.taken[json.dumps([kind, new, new_folder, *names[2:]])] = content
 
-    def _bytes(self, key: str, ask: Callable[[Mapping[Path, str]], bytes]) -> bytes:
+    def _bytes(self, key: str, from_disk: Callable[[], bytes]) -> bytes:
         if key in self._failed:
             # A new exception each time: an exception raised again would collect a traceback of all its uses.
             raise type(self._failed[key])(str(self._failed[key]))
         if key not in self.taken:
-            if self._folders is None:
+            if not self._reads_disk:
                 raise Missing("was not found when the world was read")
             try:
-                self.taken[key] = ask(self._folders)
+                self.taken[key] = from_disk()
             except (Missing, Unusable) as error:
                 self._failed[key] = error
                 raise
@@ -104,24 +159,20 @@ class Resources:
         missing = [json.loads(key)[1] for key, error in self._failed.items() if isinstance(error, Missing)]
         return tuple(dict.fromkeys(missing))
 
-    def _find(self, uri: str, base: Path, folders: Mapping[Path, str], *, model: bool) -> Path:
+    def _find(self, uri: str, base: Path, *, model: bool) -> Path:
         """The file that `uri` refers to, by its folder if it is a `model`."""
-        path = find(uri, base, folders)
+        path = find(uri, base, self._folders)
         if model and is_folder(path):
             path = model_file(path)
         refuse_link_out(path)
-        roots = {**folders, **dict.fromkeys(map(absolute, caches()), "Fuel's cache")}
+        roots = {**self._folders, **dict.fromkeys(map(absolute, caches()), "Fuel's cache")}
         self.found[uri, base] = Found(uri, path, *source_of(path, roots))
         return path
 
-    def _mesh(self, uri: str, base: Path, folders: Mapping[Path, str], *way: Any) -> bytes:
-        path = self._find(uri, base, folders, model=False)
-        return build(self._parts(path), *way)
-
-    def _sdf(self, uri: str, base: Path, folders: Mapping[Path, str]) -> bytes:
+    def _sdf(self, uri: str, base: Path) -> bytes:
         """The bytes to be stored for an SDF file: its path, a NUL byte, its content."""
         try:
-            path = self._find(uri, base, folders, model=True)
+            path = self._find(uri, base, model=True)
             text = read(path, SDF_LIMIT)
         except Missing:
             name = model_named(uri)
@@ -130,13 +181,29 @@ class Resources:
             path, text = FOLDER / f"{name}.sdf", f"<sdf version='1.5'>{_TEXTS[name]}</sdf>".encode()
         return str(path).encode("utf-8", "surrogateescape") + b"\0" + text
 
-    def _parts(self, path: Path) -> list[Part]:
+    def _parts(self, part: MeshPart) -> list[Part]:
+        path = self._find(part.uri, part.base, model=False)
         if path not in self._parts_of:
             self._parts_of[path] = read_parts(path)
         found = self._parts_of[path]
         while len(self._parts_of) > 1 and sum(map(_size, self._parts_of.values())) > MOST_KEPT:
             del self._parts_of[next(iter(self._parts_of))]
         return found
+
+
+def _cut(parts: list[Part], part: MeshPart, scale: Vector, most: int) -> bytes:
+    # Loaded late: what was cut before is shown without it.
+    from ddenv.world.files.pieces import build_pieces
+
+    return build_pieces(parts, part.submesh, part.center, scale, most)
+
+
+def _heights_of(parts: list[Part], part: MeshPart, scale: Vector) -> bytes:
+    # Loaded late, too.
+    from ddenv.world.files.surfaces import surface_heights
+
+    vertices, faces = surface_of(parts, part.submesh, part.center)
+    return surface_heights((vertices * np.array(scale), faces))
 
 
 def _size(parts: Sequence[Part]) -> int:
@@ -161,8 +228,8 @@ _TEXTS = {
 
 # The newest supported SDF version: a model's folder may hold one file per version.
 NEWEST_SDF = (1, 12)
-# A line names so many commands.
-MOST_COMMANDS = 3
+# A line names so many commands, and so many folders.
+MOST_COMMANDS = MOST_FOLDERS = 3
 MODEL_CONFIG_LIMIT = 1_000_000  # bytes
 CLIMBS = "leaves its folder with '..' (give the target folder with --model-path)"
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):(.*)", re.DOTALL)
@@ -172,11 +239,9 @@ _ABSENT = (errno.ENOENT, errno.ENOTDIR)
 
 def model_named(uri: str) -> str:
     """The model that `uri` names, such as `construction_barrel`, as its folder in Gazebo is called; "" if it names none."""
-    match = _SCHEME.fullmatch(uri.strip())
-    if match is None:
-        return ""
-    rest, name = unquote(match[2], errors="replace"), ""
-    if match[1].lower() in ("model", "package"):
+    scheme, rest = _decoded(uri)
+    name = ""
+    if scheme in ("model", "package"):
         name = rest.strip("/").split("/")[0]
     elif (model := fuel_model(uri)) is not None and model.kind == "models":
         name = model.name
@@ -185,10 +250,8 @@ def model_named(uri: str) -> str:
 
 def fuel_model(uri: str) -> FuelModel | None:
     """The model in Fuel that `uri`, or the file that it names, belongs to; None if it is no such URL."""
-    match = _SCHEME.fullmatch(uri.strip())
-    if match is None or match[1].lower() not in ("http", "https"):
-        return None
-    found = in_fuel(unquote(match[2], errors="surrogateescape"))
+    scheme, rest = _decoded(uri)
+    found = in_fuel(rest) if scheme in ("http", "https") else None
     return None if found is None else found[0]
 
 
@@ -207,7 +270,11 @@ def find(uri: str, base: Path, folders: Collection[Path]) -> Path:
 
     Raises Missing if there is none, and Unusable if the URI is invalid or not supported.
     """
-    scheme, rest = _split(uri.strip())
+    scheme, rest = _decoded(uri)
+    if not rest.strip("/ "):
+        raise Unusable("names no file")
+    if "\0" in rest:
+        raise Unusable("has a NUL byte")
     if scheme in ("model", "package"):
         path = _inside(rest)
         where = f"looked in {_listed(folders)} and the Fuel cache"
@@ -226,16 +293,12 @@ def find(uri: str, base: Path, folders: Collection[Path]) -> Path:
     return _first(staying, f"looked beside the file that names it and in {_listed(folders)}")
 
 
-def _split(uri: str) -> tuple[str, str]:
-    """The scheme in lower case (empty for a plain path) and the rest, percent-decoded. Raises Unusable."""
+def _decoded(uri: str) -> tuple[str, str]:
+    """The scheme in lower case (empty for a plain path) and the rest, percent-decoded."""
+    uri = uri.strip()
     match = _SCHEME.fullmatch(uri)
     scheme, rest = ("", uri) if match is None else (match[1].lower(), match[2].removeprefix("//"))
-    rest = unquote(rest, errors="surrogateescape")
-    if not rest.strip("/ "):
-        raise Unusable("names no file")
-    if "\0" in rest:
-        raise Unusable("has a NUL byte")
-    return scheme, rest
+    return scheme, unquote(rest, errors="surrogateescape")
 
 
 def _inside(rest: str) -> str:
@@ -319,8 +382,7 @@ def _first(candidates: Iterable[Path], where: str) -> Path:
 
 def _listed(folders: Collection[Path]) -> str:
     """The first three folders by name."""
-    names = ", ".join(str(folder)[:100] for folder in list(folders)[:3])
-    return names if len(folders) <= 3 else f"{names} and {len(folders) - 3} more"
+    return first_of([str(folder)[:100] for folder in folders], MOST_FOLDERS)
 
 
 def model_file(folder: Path) -> Path:
@@ -329,34 +391,24 @@ def model_file(folder: Path) -> Path:
     Raises Unusable if a model.config cannot be read and there is no model.sdf, or if it names a file outside of the folder;
     Missing if there is no SDF file.
     """
+    usual = folder / "model.sdf"
     try:
         config = _model_config(folder)
     except Unusable as error:
-        if not is_file(folder / "model.sdf"):
-            raise Unusable(f"model.config: {error}") from None
-        config = None
+        if is_file(usual):
+            return usual
+        raise Unusable(f"model.config: {error}") from None
     except Missing:
-        return _first([folder / "model.sdf"], f"{folder} has neither model.config nor model.sdf")
-    name = "model.sdf" if config is None else _newest_file(config)
+        return _first([usual], f"{folder} has neither model.config nor model.sdf")
+    name = _newest_file(config)
     if not name:
-        return _first([folder / "model.sdf"], "model.config names no file for SDF 1.12 or older")
+        return _first([usual], "model.config names no file for SDF 1.12 or older")
     return _first([folder / name], f"model.config names '{name[:60]}', which does not exist")
 
 
 def _model_config(folder: Path) -> Element:
     """The root of the model.config in `folder`. Raises Unusable if it cannot be read, and Missing if there is none."""
     return xml_root(read(_first([folder / "model.config"], ""), MODEL_CONFIG_LIMIT))
-
-
-def _config_fault(folder: Path) -> str:
-    """Why the model.config in `folder` cannot be read; empty if it can, or if there is none."""
-    try:
-        _model_config(folder)
-    except Unusable as error:
-        return str(error)
-    except Missing:
-        return ""
-    return ""
 
 
 def _newest_file(config: Element) -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from ddenv.world.model import Joint, Link, Model, is_ground, still_links
 from ddenv.world.pose import ONE, Pose, Vector, vector
 from ddenv.world.sdf.casters import without_ball_joints
-from ddenv.world.sdf.context import Context, note_unread
+from ddenv.world.sdf.context import MOST_MODELS, Context, note_unread
 from ddenv.world.sdf.frames import WORLD, Scope, pose_of
 from ddenv.world.sdf.includes import Part
 from ddenv.world.sdf.joints import LinkPose, Spot, check_tree, read_joints
@@ -19,27 +19,28 @@ from ddenv.world.sdf.xml import Element, complain, floats, name_of, numbers, tex
 STILL = 0.01
 # Smallest difference between `<state>` and a model's own pose that counts as a move, m and sine of half the angle.
 MOVED = 0.001
-# Maximum number of models: a few files that include each other could ask for more than any machine can hold.
-MOST_MODELS = 50_000
 
 
 @dataclass(frozen=True)
 class Saved:
-    """The entry of one model in `<state>`; poses are in the world frame."""
+    """The entry of one model in `<state>`; empty for the `element` of a model without one.
+
+    Poses are in the world frame.
+    """
 
     element: Element
-    pose: Pose | None
-    scale: Vector
-    links: dict[str, Pose]
-    models: dict[str, Saved]
+    pose: Pose | None = None
+    scale: Vector = ONE
+    links: dict[str, Pose] = field(default_factory=dict)
+    models: dict[str, Saved] = field(default_factory=dict)
 
 
 def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context: Context) -> Model:
     """The model of `part`, called by the unique `name`, with its `entry` in `<state>`. Raises UserError, also TooFar."""
     context.model = name
-    saved = None if entry is None else _saved(entry, context)
+    saved = Saved(part.at) if entry is None else _saved(entry, context)
     nominal = outer.placed(part)
-    actual = nominal if saved is None or saved.pose is None else saved.pose
+    actual = nominal if saved.pose is None else saved.pose
     spot = Spot(outer.inside(part), nominal, actual, static=_is_static(part))
     _check_has_link(part, spot.scope)
     builder = _Builder(context)
@@ -48,7 +49,7 @@ def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context
     if is_empty:
         context.note("ignored", part.element, "it has no <link>: nothing can touch it")
         builder.links.append(Link("link", actual, None, (), ()))
-    if saved is not None:
+    if entry is not None:
         _note_move(list(builder.poses.values()), saved, context)
     pulled = [truth(link, "gravity", True) for link in builder.elements]
     model = Model(
@@ -57,13 +58,13 @@ def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context
         static=spot.static,
         links=tuple(builder.links),
         joints=tuple(builder.joints),
-        spans=tuple((one.start, one.end) for one in (part.at, *([saved.element] if saved else []))),
+        spans=tuple((one.start, one.end) for one in (part.at, entry) if one is not None),
         line=part.at.line,
         gravity=spot.static or any(pulled),
         self_collide=any(builder.self_collide),
     )
     if is_empty or len(still_links(model)) == len(model.links):
-        return _still(model)
+        return still(model)
     check_tree(builder.joints, part.element)
     # These settings differ between links, but are simulated for the model as a whole.
     if any(pulled) and not all(pulled):
@@ -73,11 +74,11 @@ def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context
         context.note("replaced", part.element, "self-collision of some links by self-collision of all links")
     if not is_ground(model):
         return without_ball_joints(model, part.element, context)
-    context.note("replaced", part.element, "static, since an infinite plane does not move")
-    return _still(model)
+    context.note("replaced", part.element, "static, since ground does not move")
+    return still(model)
 
 
-def _still(model: Model) -> Model:
+def still(model: Model) -> Model:
     """`model`, static."""
     links = tuple(replace(link, inertia=None) for link in model.links)
     return replace(model, static=True, links=links, joints=(), gravity=True)
@@ -97,7 +98,7 @@ class _Builder:
         self.self_collide: list[bool] = []
         self.poses: dict[str, LinkPose] = {}
 
-    def add(self, spot: Spot, saved: Saved | None) -> None:
+    def add(self, spot: Spot, saved: Saved) -> None:
         """Adds everything in the model at `spot`, whose entry in `<state>` is `saved`. Raises UserError."""
         scope = spot.scope
         self.context.assembled += 1
@@ -105,7 +106,7 @@ class _Builder:
             why = f"there are more than {MOST_MODELS} models, including nested and included ones"
             raise complain(scope.element, why)
         note_unread(scope.element, self.context)
-        if saved is not None and saved.scale != ONE:
+        if saved.scale != ONE:
             spot = replace(spot, scale=saved.scale)
         collide = truth(scope.element, "self_collide", False)
         for element in scope.element.findall("link"):
@@ -115,13 +116,13 @@ class _Builder:
             self._add_part(part, spot, saved)
         if not spot.static:
             self.joints += read_joints(spot, self.poses, self.context)
-        if saved is not None:
-            known = {name_of(link) for link in scope.element.findall("link")} | {part.name for part in scope.parts}
-            for name in (*saved.links, *saved.models):
-                if name not in known:
-                    self.context.note("ignored", saved.element, f"the model has no '{name[:80]}'")
+        known = {name_of(link) for link in scope.element.findall("link")}
+        known |= {part.name for part in scope.parts}
+        for name in (*saved.links, *saved.models):
+            if name not in known:
+                self.context.note("ignored", saved.element, f"the model has no '{name[:80]}'")
 
-    def _add_link(self, element: Element, spot: Spot, saved: Saved | None) -> None:
+    def _add_link(self, element: Element, spot: Spot, saved: Saved) -> None:
         own = name_of(element)
         name = spot.prefix + own
         if own == WORLD:
@@ -129,15 +130,15 @@ class _Builder:
         if name in self.poses:
             raise complain(element, "this link name is used twice; give each link of the model its own name")
         local = spot.scope.place(element)
-        there = spot.actual @ local if saved is None else saved.links.get(own, spot.actual @ local)
+        there = saved.links.get(own, spot.actual @ local)
         self.poses[name] = LinkPose(spot.nominal @ local, there)
         self.elements.append(element)
-        self.links.append(read_link(element, spot, self.context, there, local, moving=not spot.static))
+        self.links.append(read_link(element, spot, self.context, there, local))
 
-    def _add_part(self, part: Part, spot: Spot, outer: Saved | None) -> None:
+    def _add_part(self, part: Part, spot: Spot, outer: Saved) -> None:
         local = spot.scope.placed(part)
-        saved = None if outer is None else outer.models.get(part.name)
-        there = spot.actual @ local if saved is None or saved.pose is None else saved.pose
+        saved = outer.models.get(part.name, Saved(part.at))
+        there = spot.actual @ local if saved.pose is None else saved.pose
         before = len(self.links)
         prefix = spot.prefix if part.merged else f"{spot.prefix}{part.name}::"
         static = spot.static or (_is_static(part) and not part.merged)

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
 from ddenv.errors import UserError
 from ddenv.settings import Ignorable
+from ddenv.text import first_of
 from ddenv.world.access import MissingFiles, Unsupported
 from ddenv.world.files.resources import Resources, how_to_fetch
-from ddenv.world.model import Note
+from ddenv.world.model import Note, World
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.standin import ALL_MISSING, AUTO, StandIn, matching, parse_stand_ins
 from ddenv.world.sdf.xml import Element, complain, floats, parse, place
 from ddenv.world.tinyxml import strict_fault
 
+# Maximum number of models: a few files that include each other could ask for more than any machine can hold.
+MOST_MODELS = 50_000
 VERSIONS = ("1.4", "1.5", "1.6", "1.7", "1.8", "1.9", "1.10", "1.11", "1.12")
 # By parent: the children that need no note, since they are read or do not affect how a robot drives.
 QUIET: dict[str, frozenset[str]] = {
     tag: frozenset(children.split())
     for tag, children in {
-        "world": "model include state frame gravity light gui scene physics spherical_coordinates magnetic_field "
+        "world": "model include population state frame gravity light gui scene physics spherical_coordinates magnetic_field "
         "atmosphere audio",
         "model": "link joint model include frame pose static self_collide allow_auto_disable",
         "include": "uri name pose placement_frame static",
@@ -49,7 +52,7 @@ ONCE |= {"axis", "axis2", "parent", "child", "limit"}
 REASONS = {
     "plugin": "plugins are not run",
     "sensor": "only the robot's own sensors are simulated",
-    "actor": "nothing can touch it",
+    "actor": "actors are not simulated",
     "road": "it is not drawn",
     "wind": "wind is not simulated",
     "enable_wind": "wind is not simulated",
@@ -73,6 +76,10 @@ WITHOUT = {
 INSIDE = frozenset(
     ["inertial", "inertia", "surface", "friction", "bounce", "axis", "axis2", "limit", "dynamics", "velocity_decay"]
 )
+
+
+# A message names so many other files.
+MOST_NAMED = 5
 
 
 @dataclass
@@ -109,7 +116,7 @@ class Context:
         if fault is None:
             return
         file = "/".join(root.source.parts[-2:])
-        why = f"in {file}, line {fault.line}, column {fault.column}: {fault}; the file was read as Gazebo reads it"
+        why = f"in {file}, {fault}; the file was read as Gazebo reads it"
         self.notes.append(Note("ignored", self.model, place(root), "a fault of XML", why))
 
     def note_unused(self, root: Element) -> None:
@@ -117,6 +124,17 @@ class Context:
         # `auto` asks for nothing as long as nothing is missing.
         for uri in sorted(uri for uri, own in self.stand_ins.items() if own != AUTO and uri not in self.used):
             self.note("ignored", root, f"the stand-in for '{uri}' is not used: no model or mesh names it")
+
+    def recorded(self, world: World) -> World:
+        """`world`, with what was noted, found and guessed as it was read."""
+        return replace(
+            world,
+            notes=tuple(self.notes),
+            resources=self.resources.taken,
+            found=tuple(self.resources.found.values()),
+            absent=self.resources.absent(),
+            guessed=tuple(self.guessed),
+        )
 
     def complain_of_missing(self) -> None:
         """Raises MissingFiles with the first error, and the names of the other files."""
@@ -147,8 +165,7 @@ class Context:
 
 def _also(what: str, uris: Sequence[str]) -> str:
     """The end of a sentence that names other files."""
-    more = f" and {len(uris) - 5} more" if len(uris) > 5 else ""
-    return f"; {what}: {', '.join(repr(uri[:100]) for uri in uris[:5])}{more}" if uris else ""
+    return f"; {what}: {first_of([repr(uri[:100]) for uri in uris], MOST_NAMED)}" if uris else ""
 
 
 def sdf_root(text: bytes, path: Path) -> Element:
@@ -161,7 +178,7 @@ def sdf_root(text: bytes, path: Path) -> Element:
         raise complain(root, f"is a robot in URDF, and no world; {how_to_include(path)}")
     if root.tag != "sdf":
         raise complain(root, "expected <sdf> as the outermost element: is this an SDF file?")
-    given = (root.get("version") or "").strip()
+    given = root.get("version", "").strip()
     if given not in VERSIONS:
         said = f"version '{given[:20]}' is not supported" if given else "has no version attribute"
         raise complain(root, f"{said}; use SDF {VERSIONS[0]} to {VERSIONS[-1]}")

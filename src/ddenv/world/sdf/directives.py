@@ -21,7 +21,7 @@ from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.text import printable
 from ddenv.world.access import Missing, Unusable, not_yaml
-from ddenv.world.pose import Pose
+from ddenv.world.pose import HERE, Pose, turn, vector
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import FARTHEST
 
@@ -62,10 +62,14 @@ class Source:
         """`name` with the namespace before it; `world` has none."""
         return name if name == WORLD or not self.namespace else f"{self.namespace}::{name}"
 
+    def name_of(self, node: Node) -> str:
+        """The name in a scalar, with the namespace before it. Raises UserError."""
+        return self.scoped(self.text_of(node))
+
     def inner(self, keys: Mapping[str, Node]) -> str:
         """The namespace that `model_namespace` of a directive says. Raises UserError."""
         own = keys.get("model_namespace")
-        return self.namespace if own is None else self.scoped(self.text_of(own))
+        return self.namespace if own is None else self.name_of(own)
 
     def bytes_of(self, span: Span) -> Span:
         """Byte positions in the encoded text for positions in the text."""
@@ -80,15 +84,20 @@ class Source:
             raise self.complain(node, "expected a name or a file")
         return str(node.value)
 
-    def pairs(self, node: Node) -> dict[str, Node]:
-        """The values of a mapping by key. Raises UserError for anything else, and for a key that stands twice."""
+    def pairs(self, node: Node | None) -> dict[str, Node]:
+        """The values of a mapping by key; none without one.
+
+        Raises UserError for anything else, and for a key that stands twice.
+        """
+        if node is None:
+            return {}
         if not isinstance(node, MappingNode):
             raise self.complain(node, "expected keys with values")
         found: dict[str, Node] = {}
         for key, value in node.value:
             name = self.text_of(key)
             if name in found:
-                raise self.complain(key, f"the key '{name[:80]}' appears twice")
+                raise self.complain(key, f"the key '{name}' appears twice")
             found[name] = value
         return found
 
@@ -97,15 +106,17 @@ class Source:
         found, known = self.pairs(node), [key.lstrip("*") for key in keys]
         for key in found:
             if key not in known:
-                near = nearest(key[:80], known)
-                raise self.complain(node, f"{what}: unknown key '{key[:80]}'{near}; allowed are {', '.join(known)}")
+                hint = f"{nearest(key, known)}; allowed are {', '.join(known)}"
+                raise self.complain(node, f"{what}: unknown key '{key}'{hint}")
         for key in keys:
             if key[0] == "*" and key[1:] not in found:
                 raise self.complain(node, f"{what}: {key[1:]} is missing")
         return found
 
-    def items(self, node: Node) -> list[Node]:
-        """The items of a list. Raises UserError for anything else."""
+    def items(self, node: Node | None) -> list[Node]:
+        """The items of a list; none without one. Raises UserError for anything else."""
+        if node is None:
+            return []
         if not isinstance(node, SequenceNode):
             raise self.complain(node, "expected a list")
         return list(node.value)
@@ -131,7 +142,7 @@ class Source:
     def pose(self, node: Node | None, *, with_base: bool = True) -> tuple[Node | None, Pose]:
         """The `base_frame` of a transform, which may be missing, and its pose in that: m, and degrees. Raises UserError."""
         if node is None:
-            return None, Pose()
+            return None, HERE
         keys = self.keys(node, "pose", ("base_frame",) * with_base + ("translation", "rotation"))
         for value in keys.values():
             if value.tag == "!Uniform" or value.tag.startswith("!Gaussian"):
@@ -139,23 +150,25 @@ class Source:
         x, y, z = self.numbers(keys["translation"], 3) if "translation" in keys else (0.0, 0.0, 0.0)
         if max(abs(x), abs(y), abs(z)) > FARTHEST:
             raise self.complain(node, f"is farther than {FARTHEST:g} m away")
-        turn = self._rotation(keys["rotation"]) if "rotation" in keys else Pose()
-        return keys.get("base_frame"), Pose((x, y, z), turn.quaternion)
+        rotation = self._rotation(keys.get("rotation"))
+        return keys.get("base_frame"), Pose((x, y, z), rotation.quaternion)
 
-    def _rotation(self, node: Node) -> Pose:
+    def _rotation(self, node: Node | None) -> Pose:
+        if node is None:
+            return HERE
         if node.tag == "!Rpy":
             angles = self.numbers(self.keys(node, "!Rpy", ("*deg",))["deg"], 3)
             return Pose.from_rpy(0.0, 0.0, 0.0, *map(math.radians, angles))
         if node.tag == "!AngleAxis":
             keys = self.keys(node, "!AngleAxis", ("*angle_deg", "*axis"))
-            half, axis = math.radians(self.number(keys["angle_deg"])) / 2, self.numbers(keys["axis"], 3)
+            axis = self.numbers(keys["axis"], 3)
             length = math.hypot(*axis)
             if not 1e-9 < length < 1e9:
                 raise self.complain(node, "the axis has no usable length")
-            x, y, z = (part / length * math.sin(half) for part in axis)
-            return Pose((0.0, 0.0, 0.0), (math.cos(half), x, y, z))
+            angle = math.radians(self.number(keys["angle_deg"]))
+            return turn(vector(part / length for part in axis), angle)
         if node.tag in ("!Identity", "tag:yaml.org,2002:map") and not node.value:
-            return Pose()
+            return HERE
         raise self.complain(node, f"expected a rotation !Rpy or !AngleAxis, found {node.tag[:40]}")
 
 
@@ -210,7 +223,7 @@ def _open(source: Source, files: tuple[Path, ...], context: Context, found: list
             raise source.complain(node, f"expected one directive: {', '.join(KEYS)}")
         ((kind, value),) = source.pairs(node).items()
         if kind not in KEYS:
-            raise source.complain(node, f"unknown directive '{kind[:80]}'{nearest(kind[:80], list(KEYS))}")
+            raise source.complain(node, f"unknown directive '{kind}'{nearest(kind, KEYS)}")
         one = Directive(kind, source.keys(value, kind, KEYS[kind]), node, source, source.bytes_of((start, end)))
         if len(found) >= MOST:
             raise source.complain(node, f"more than {MOST} directives")
@@ -281,16 +294,15 @@ def _flat(one: Directive) -> str:
     """A directive on one line, its names as seen from the outermost file."""
     node, source = deepcopy(one.node), one.source
     keys = source.pairs(source.pairs(node)[one.kind])
-    groups = [
-        node for key in ("member_groups", "ignored_collision_filter_groups") if key in keys for node in keys[key].value
-    ]
-    named = [*groups, *(keys["members"].value if "members" in keys else ())]
+    groups = source.items(keys.get("member_groups"))
+    groups += source.items(keys.get("ignored_collision_filter_groups"))
+    named: list[Any] = [*groups, *source.items(keys.get("members"))]
     named += [keys[key] for key in ("parent", "child") if key in keys]
     # A frame of the world is in no namespace.
     if "name" in keys and (one.kind != "add_frame" or "::" in keys["name"].value):
         named.append(keys["name"])
     poses = [keys["X_PF"]] if "X_PF" in keys else []
-    poses += source.pairs(keys["default_free_body_pose"]).values() if "default_free_body_pose" in keys else ()
+    poses += source.pairs(keys.get("default_free_body_pose")).values()
     named += [base for pose in poses if (base := source.pairs(pose).get("base_frame")) is not None]
     for each in named:
         each.value = source.scoped(each.value)

@@ -91,9 +91,7 @@ class Scope:
             first, _, rest = name.partition("::")
             if rest and isinstance(part := self.named.get(first), Part):
                 return first, self.inside(part).pose(rest, asker), asker
-            # A nearest match among thousands of names would take longer than reading the file.
-            hint = nearest(name[:80], [each[:80] for each in list(self.named)[:500]])
-            raise complain(asker, f"there is no frame '{name[:80]}' here{hint}")
+            raise complain(asker, f"there is no frame '{name}' here{nearest(name, self.named)}")
         if isinstance(thing, Part):
             element, holder, default = thing.pose, thing.at, ""
         else:
@@ -178,7 +176,9 @@ class Scope:
 
 def _carrier(thing: Element) -> str:
     """What a joint or a frame is fixed to; empty for a link."""
-    return text_of(thing.find("child")) if thing.tag == "joint" else (thing.get("attached_to") or "").strip()
+    if thing.tag == "joint":
+        return text_of(thing.find("child"))
+    return thing.get("attached_to", "").strip()
 
 
 def shown(names: list[str]) -> str:
@@ -203,7 +203,8 @@ def pose_of(element: Element) -> Pose:
         pose = Pose((x, y, z), (w, i, j, k))
     else:
         x, y, z, *angles = numbers(element, 6)
-        scale = math.pi / 180 if (element.get("degrees") or "").strip().lower() in ("1", "true") else 1.0
+        in_degrees = element.get("degrees", "").strip().lower() in ("1", "true")
+        scale = math.pi / 180 if in_degrees else 1.0
         pose = Pose.from_rpy(x, y, z, *(angle * scale for angle in angles)) if any(angles) else Pose((x, y, z))
     if max(abs(x), abs(y), abs(z)) > FARTHEST:
         raise TooFar(str(complain(element, f"is farther than {FARTHEST:g} m away")))

@@ -3,39 +3,46 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from ddenv.arrays import Floats
 from ddenv.text import Names
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.extent import circle, convex_hull, polygon_area
+from ddenv.world.files.boxes import box_of
 from ddenv.world.files.meshes import convex_hull as hull
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
+from ddenv.world.files.resources import MeshPart
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere, Terrain
 from ddenv.world.pose import HERE, ONE, Pose, Vector, pointing, vector
 from ddenv.world.sdf.context import Context, refuse
 from ddenv.world.sdf.standin import AUTO, NONE, SIZES, Placed
-from ddenv.world.sdf.xml import Element, complain, numbers, text_of, truth
+from ddenv.world.sdf.xml import Element, complain, number, numbers, text_of, truth
 from ddenv.world.write import primitive
 
 SIDES = 32  # of a cone
-SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline")
+SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline", "heightmap")
 SMALLEST, LARGEST = 1e-6, 1e6  # m
-# The sizes of a shape whose element gives none, m: those of libsdformat, by the element and its child.
-DEFAULT_SIZES: dict[tuple[str, str], tuple[float, ...]] = {
-    ("box", "size"): (1.0, 1.0, 1.0),
-    ("capsule", "radius"): (0.5,),
-    ("capsule", "length"): (1.0,),
-    ("cone", "radius"): (0.5,),
-    ("cone", "length"): (1.0,),
-    ("cylinder", "radius"): (1.0,),
-    ("cylinder", "length"): (1.0,),
-    ("ellipsoid", "radii"): (1.0, 1.0, 1.0),
-    ("plane", "size"): (1.0, 1.0),
-    ("polyline", "height"): (1.0,),
-    ("sphere", "radius"): (1.0,),
+# The sizes of each shape, m, by the elements that say them: libsdformat takes these where one is
+# missing.
+DEFAULT_SIZES: dict[str, dict[str, tuple[float, ...]]] = {
+    "box": {"size": ONE},
+    "capsule": {"radius": (0.5,), "length": (1.0,)},
+    "cone": {"radius": (0.5,), "length": (1.0,)},
+    "cylinder": {"radius": (1.0,), "length": (1.0,)},
+    "ellipsoid": {"radii": ONE},
+    "heightmap": {"size": ONE},
+    "plane": {"size": (1.0, 1.0)},
+    "polyline": {"height": (1.0,)},
+    "sphere": {"radius": (1.0,)},
 }
+# The maximum number of convex pieces of one mesh, and that of libsdformat for <convex_decomposition> without a number.
+MOST_PIECES = 512
+DEFAULT_HULLS = 16
+ROUGH = "contact at the edges of those that are no boxes is rough"
 RANGE = f"sizes must be from {SMALLEST:g} to {LARGEST:g} m"
 
 
@@ -76,34 +83,34 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
         case "mesh":
             return _mesh(element, parent, context, scale)
         case "polyline":
-            return Placed(_scaled(read_polyline(geometry, context), scale, element))
+            return _polyline(geometry, scale)
         case "empty":
             return None
         case "heightmap" | "image" as tag:
             seen = parent.tag == "visual"
             if not seen and not context.ignores(tag):
-                raise refuse(element, tag, f"a {tag} is not supported: nothing would collide with it")
+                return _terrain(element, context, scale)
             why = f"a {tag} is not drawn" if seen else "left out by --ignore: nothing collides with it"
             context.note("ignored", element, why)
             return None
         case "plane":
-            length, width = _sizes(element, "size")
-            return Placed(Plane((length, width)), _turned(element.find("normal")))
+            return Placed(Plane(*_sizes(element)), _turned(element.find("normal")))
     return Placed(_scaled(_primitive(element), scale, element))
 
 
 def _primitive(element: Element) -> Shape:
-    match element.tag:
-        case "box":
-            return Box(vector(_sizes(element, "size")))
-        case "ellipsoid":
-            return Ellipsoid(vector(_sizes(element, "radii")))
-        case "sphere":
-            return Sphere(*_sizes(element, "radius"))
-        case "cylinder" | "capsule" | "cone" as tag:
-            kinds: dict[str, Callable[[float, float], Shape]] = {"cylinder": Cylinder, "capsule": Capsule, "cone": cone}
-            return kinds[tag](*_sizes(element, "radius"), *_sizes(element, "length"))
-    raise complain(element, f"<{element.tag}> is not a known shape; use one of {', '.join(SHAPES)}")
+    kinds: dict[str, Callable[..., Shape]] = {
+        "box": Box,
+        "capsule": Capsule,
+        "cone": cone,
+        "cylinder": Cylinder,
+        "ellipsoid": Ellipsoid,
+        "sphere": Sphere,
+    }
+    if element.tag not in kinds:
+        known = ", ".join(SHAPES)
+        raise complain(element, f"<{element.tag}> is not a known shape; use one of {known}")
+    return kinds[element.tag](*_sizes(element))
 
 
 def _turned(normal: Element | None) -> Pose:
@@ -136,19 +143,85 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
     submesh = element.find("submesh")
     name = "" if submesh is None else text_of(submesh.find("name"))
     center = submesh is not None and truth(submesh, "center", False)
-    convex = parent.tag == "collision"
+    full = _times(own, scale)
+    part = MeshPart(uri, element.source.parent, name, center)
     try:
-        mesh = context.resources.mesh(uri, element.source.parent, submesh=name, center=center, convex=convex)
+        if parent.tag == "collision":
+            return _solid(part, element, parent, context, full)
+        mesh = context.resources.mesh(part, convex=False)
     except (Missing, Unusable) as error:
         word = AUTO if context.may_guess(uri) else ""
-        return Lost(element, uri, str(error), word, _times(own, scale), unreadable=isinstance(error, Unusable))
-    if convex:
-        context.note(
-            "replaced", element, f"'{uri}' by its convex hull; contact at the edges of hulls that are no boxes is rough"
-        )
-    elif mesh.simplified:
+        return Lost(element, uri, str(error), word, full, unreadable=isinstance(error, Unusable))
+    if mesh.simplified:
         context.note("replaced", element, f"'{uri}' by its convex hull, since it is too fine to be drawn")
-    return Placed(_scaled(mesh, _times(own, scale), element))
+    return Placed(_scaled(mesh, full, element))
+
+
+def _terrain(element: Element, context: Context, scale: Vector) -> Placed:
+    """The ground that a `<heightmap>` stands for. Raises UserError."""
+    if element.tag == "image":
+        raise refuse(element, "image", "an image is not supported: nothing would collide with it")
+    uri = text_of(element.find("uri"))
+    if not uri:
+        raise complain(element, "has no <uri>")
+    size = _times(vector(*_sizes(element)), scale)
+    place = element.find("pos")
+    try:
+        shares = context.resources.heights(MeshPart(uri, element.source.parent))
+    except (Missing, Unusable) as error:
+        what = "is not available" if isinstance(error, Missing) else "is unreadable"
+        raise refuse(element, "heightmap", f"heightmap '{uri[:200]}' {what}: {error}") from None
+    middle = (0.0, 0.0, 0.0) if place is None else _times(vector(numbers(place, 3)), scale)
+    return _ground(uri, shares, size, middle)
+
+
+def _ground(uri: str, shares: Floats, size: Vector, middle: Vector) -> Placed:
+    """The ground that `shares` (R, C) of the height of a box give, which has its bottom's `middle` (m) there."""
+    digest = hashlib.blake2b(shares.tobytes(), digest_size=8).hexdigest()
+    return Placed(Terrain(size[:2], shares * size[2], f"{uri} {digest} {size}"), Pose(middle))
+
+
+def _solid(part: MeshPart, element: Element, parent: Element, context: Context, scale: Vector) -> Placed:
+    """What collides in place of a mesh: its convex pieces, or its hull. Raises Missing, Unusable and UserError."""
+    hull = _scaled_mesh(context.resources.mesh(part, convex=True), scale, element)
+    most = _most_pieces(element, parent, context)
+    try:
+        shares = context.resources.ground(part, scale) if most > 1 else None
+    except (Missing, Unusable):
+        shares = None
+    if shares is not None:
+        low, high = hull.vertices.min(axis=0), hull.vertices.max(axis=0)
+        context.note("replaced", element, f"'{part.uri}' by the solid ground below it")
+        return _ground(part.uri, shares, vector(high - low), vector([*(low + high)[:2] / 2, low[2]]))
+    pieces = context.resources.pieces(part, scale, most) if most > 1 else []
+    if len(pieces) == 1 and (box := box_of(hull)) is not None:
+        return Placed(*box)
+    if len(pieces) < 2:
+        context.note("replaced", element, f"'{part.uri}' by its convex hull; {ROUGH}")
+        return Placed(hull)
+    context.note("replaced", element, f"'{part.uri}' by its convex pieces; {ROUGH}", f"{len(pieces)} pieces")
+    whole = _scaled_mesh(context.resources.mesh(part, convex=False), scale, element)
+    return _of_pieces(whole, pieces)
+
+
+def _most_pieces(element: Element, parent: Element, context: Context) -> int:
+    """The maximum number of convex pieces of the `<mesh>` of a collision; 1 for its hull. Raises UserError."""
+    wanted = element.get("optimization", "")
+    if wanted == "convex_hull" or context.reading.mesh == "hull" or _is_turned(parent):
+        return 1
+    decomposition = element.find("convex_decomposition")
+    if wanted != "convex_decomposition" or decomposition is None:
+        return MOST_PIECES
+    return int(min(max(number(decomposition, "max_convex_hulls", DEFAULT_HULLS), 1), MOST_PIECES))
+
+
+def _is_turned(collision: Element) -> bool:
+    """Whether a joint turns the link of a `<collision>`: a wheel rolls on its hull, and what stands for it is found by that."""
+    link = collision.parent
+    if link is None or link.parent is None:
+        return False
+    joints = (joint for joint in link.parent.findall("joint") if joint.get("type") in ("revolute", "continuous"))
+    return any(text_of(joint.find("child")) == link.get("name") for joint in joints)
 
 
 def scaled(stand_in: Placed, scale: Vector, element: Element) -> Placed:
@@ -174,6 +247,8 @@ def remedies(lost: Lost, siblings: Names) -> str:
 def _scaled(shape: Shape, scale: Vector, element: Element) -> Shape:
     """`shape`, with its sizes along its own axes times `scale`. Raises UserError if it is too small or too large then."""
     match shape:
+        case Mesh():
+            return _scaled_mesh(shape, scale, element)
         case _ if scale == ONE:
             pass
         case Box(size):
@@ -184,56 +259,75 @@ def _scaled(shape: Shape, scale: Vector, element: Element) -> Shape:
             shape = Sphere(radius * max(scale))
         case Ellipsoid(radii):
             shape = Ellipsoid(_times(radii, scale))
-        case Mesh(origin, vertices, faces):
-            # Mirroring turns a surface inside out: reverse its faces.
-            turned = faces[:, ::-1] if np.prod(scale) < 0 else faces
-            shape = Mesh(f"{origin} * {scale}", vertices * np.array(scale), turned)
-    if isinstance(shape, Mesh):
-        sizes = [np.ptp(shape.vertices, axis=0).max(), max(np.abs(shape.vertices).max(), SMALLEST)]
-    else:
-        sizes = [size for each in primitive(shape)[1].values() for size in each]
-    if min(sizes) < SMALLEST or max(sizes) > LARGEST:
-        wrong = min(sizes) if min(sizes) < SMALLEST else max(sizes)
-        raise complain(element, f"{RANGE}, found {wrong:g} m after scaling")
+    _check_sizes([size for each in primitive(shape)[1].values() for size in each], element)
     return shape
 
 
+def _scaled_mesh(mesh: Mesh, scale: Vector, element: Element) -> Mesh:
+    if scale != ONE:
+        # Mirroring turns a surface inside out: reverse its faces.
+        faces = mesh.faces[:, ::-1] if np.prod(scale) < 0 else mesh.faces
+        vertices = mesh.vertices * np.array(scale)
+        mesh = Mesh(f"{mesh.origin} * {scale}", vertices, faces, simplified=mesh.simplified)
+    largest = float(np.ptp(mesh.vertices, axis=0).max())
+    _check_sizes([largest, max(float(np.abs(mesh.vertices).max()), SMALLEST)], element)
+    return mesh
+
+
+def _check_sizes(sizes: Sequence[float], element: Element) -> None:
+    if min(sizes) < SMALLEST or max(sizes) > LARGEST:
+        wrong = min(sizes) if min(sizes) < SMALLEST else max(sizes)
+        raise complain(element, f"{RANGE}, found {wrong:g} m after scaling")
+
+
 def _times(vector: Vector, scale: Vector) -> Vector:
-    if scale == ONE:
-        return vector
     return (vector[0] * scale[0], vector[1] * scale[1], vector[2] * scale[2])
 
 
-def _sizes(shape: Element, tag: str) -> tuple[float, ...]:
-    """The sizes in the child `tag` of a shape, m. Raises UserError."""
-    usual = DEFAULT_SIZES[shape.tag, tag]
-    element = shape.find(tag)
-    if element is None:
-        return usual
-    values = numbers(element, len(usual))
-    if min(values) < SMALLEST or max(values) > LARGEST:
-        raise complain(element, f"{RANGE}, found '{text_of(element)[:60]}'")
-    return values
+def _sizes(shape: Element) -> list[Any]:
+    """The sizes of a shape, m, as in DEFAULT_SIZES: numbers, or vectors. Raises UserError."""
+    sizes: list[Any] = []
+    for tag, usual in DEFAULT_SIZES[shape.tag].items():
+        element = shape.find(tag)
+        values = usual if element is None else numbers(element, len(usual))
+        if element is not None and (min(values) < SMALLEST or max(values) > LARGEST):
+            raise complain(element, f"{RANGE}, found '{text_of(element)[:60]}'")
+        sizes.append(values[0] if len(values) == 1 else values)
+    return sizes
 
 
-def read_polyline(geometry: Element, context: Context) -> Mesh:
-    """The convex hull of all `<polyline>`s of a `<geometry>`, extruded upwards from z = 0. Raises UserError."""
+def _polyline(geometry: Element, scale: Vector) -> Placed:
+    """All `<polyline>`s of a `<geometry>`, extruded upwards from z = 0; what lies in two of them is a hole. Raises UserError."""
     elements = geometry.findall("polyline")
-    height = _sizes(elements[0], "height")[0]
+    (height,) = _sizes(elements[0])
     outlines = [np.array([numbers(point, 2) for point in element.findall("point")]) for element in elements]
     corners = convex_hull(np.vstack([outline.reshape(-1, 2) for outline in outlines]))
     if len(corners) < 3:
         raise complain(elements[0], "needs at least three <point>s that are not on one line")
-    filled = abs(polygon_area(outlines[0]))
-    if len(elements) > 1 or filled < 0.99 * polygon_area(corners):
-        context.note("replaced", elements[0], "a polyline that is not convex, or has holes, by its convex hull")
-    low = np.column_stack([corners, np.zeros(len(corners))])
     # Meshes of equal outlines compare equal.
-    origin = f"polyline {hashlib.blake2b(corners.tobytes(), digest_size=8).hexdigest()} {height!r}"
+    digest = hashlib.blake2b(repr([outline.tolist() for outline in outlines]).encode(), digest_size=8).hexdigest()
+    origin = f"polyline {digest} {height!r}"
+    if len(elements) == 1 and abs(polygon_area(outlines[0])) >= 0.99 * polygon_area(corners):
+        low = np.column_stack([corners, np.zeros(len(corners))])
+        try:
+            convex = Mesh(origin, *hull(np.vstack([low, low + np.array([0, 0, height])])))
+        except ValueError as error:
+            raise complain(elements[0], str(error)) from None
+        return Placed(_scaled(convex, scale, elements[0]))
+    # Loaded late: most worlds have no such shape.
+    from ddenv.world.files.pieces import convex_pieces, extruded
+
+    whole = _scaled_mesh(Mesh(origin, *extruded(outlines, height)), scale, elements[0])
     try:
-        return Mesh(origin, *hull(np.vstack([low, low + np.array([0, 0, height])])))
+        pieces = convex_pieces(whole.vertices, whole.faces, MOST_PIECES)
     except ValueError as error:
         raise complain(elements[0], str(error)) from None
+    return _of_pieces(whole, [Mesh(f"{origin} {number}", *piece) for number, piece in enumerate(pieces)])
+
+
+def _of_pieces(whole: Shape, pieces: list[Mesh]) -> Placed:
+    """A mesh that collides as its convex pieces, of which those that are boxes become boxes."""
+    return Placed(whole, pieces=tuple(box_of(piece) or (piece, HERE) for piece in pieces))
 
 
 def cone(radius: float, length: float) -> Mesh:

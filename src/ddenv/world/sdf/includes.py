@@ -6,16 +6,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
+from ddenv.errors import UserError
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.files.resources import FOLDER
-from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
+from ddenv.world.sdf.context import REASONS, Context, note_unread, refuse, sdf_root
 from ddenv.world.sdf.standin import NO_FLOOR, NONE, SIZES, StandIn, guess
 from ddenv.world.sdf.urdf import root_of
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
 from ddenv.world.write import primitive
 
-# Intangible things that an included file may hold in place of a model.
-UNTOUCHABLE = ("actor", "light")
+# What an included file may hold in place of a model, with the note.
+NO_MODELS = {"actor": REASONS["actor"], "light": "nothing can touch it"}
 # Prefix of the made-up file names of stand-ins.
 STAND_IN = "stand-in "
 
@@ -71,8 +72,9 @@ def included(include: Element, files: tuple[Path, ...], context: Context) -> Par
         chain = " includes ".join(path.name for path in (*files[files.index(root.source) :], root.source))
         raise complain(include, f"the includes form a cycle: {chain}")
     models = root.findall("model")
-    if not models and any(root.find(tag) is not None for tag in UNTOUCHABLE):
-        context.note("ignored", include, "nothing can touch it")
+    instead = [why for tag, why in NO_MODELS.items() if root.find(tag) is not None]
+    if instead and not models:
+        context.note("ignored", include, instead[0])
         return None
     if len(models) != 1:
         found = f"{len(models)} <model> elements" if models else "no <model>"
@@ -91,7 +93,9 @@ def _last_of(uri: str) -> str:
 
 
 def _root(include: Element, uri: str, context: Context) -> Element | None:
-    """The root of the included file; None if it is missing (noted or remembered in `context`)."""
+    """The root of the included file; None if it is missing or broken (noted or remembered in `context`)."""
+    if uri in context.missing:
+        return None
     given = context.stand_in(uri)
     if given is not None and given[1] == NONE:
         context.note("ignored", include, f"'{uri}' is left out as asked")
@@ -104,25 +108,29 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
         if root.source.parent == FOLDER and root.find("model") is not None:
             _note_replaced(include, uri, "the one built into ddenv, which is like Gazebo's", context)
         return root
-    except Unusable as error:
-        raise complain(include, f"'{uri[:200]}' cannot be included: {error}") from None
-    except Missing as missing:
+    except (Missing, Unusable, UserError) as error:
         if context.may_guess(uri):
             return _guessed_root(include, uri, context)
+        is_missing = isinstance(error, Missing)
+        problem = "was not found" if is_missing else "cannot be included"
+        why = f"'{uri[:200]}' {problem}: {error}"
         if context.ignores("include"):
-            context.note("ignored", include, f"'{uri}' was not found: {missing}")
+            context.note("ignored", include, why)
             return None
+        # Another folder would not help if the file is there.
+        folder = "its folder with --model-path, " if is_missing else ""
         remedies = (
-            f"give its folder with --model-path, a shape for it with --stand-in '{uri[:200]}=box:1,1,1' (m; or cylinder, "
-            "sphere, ...), have one guessed with --stand-in auto, or leave it out with --ignore include"
+            f"give {folder}a shape for it with --stand-in '{uri[:200]}=box:1,1,1' (m; or cylinder, sphere, ...), "
+            "have one guessed with --stand-in auto, or leave it out with --ignore include"
         )
-        why = f"'{uri[:200]}' was not found ({missing}); {remedies}"
-        context.missing.setdefault(uri, complain(include, why))
+        if not is_missing:
+            context.unreadable[uri] = str(error)
+        context.missing.setdefault(uri, complain(include, f"{why}; {remedies}"))
         return None
 
 
 def _file_root(include: Element, uri: str, context: Context) -> Element:
-    """The root of the file that `uri` names. Raises Missing and Unusable."""
+    """The root of the file that `uri` names. Raises Missing, Unusable and UserError."""
     path, text = context.resources.sdf(uri, include.source.parent)
     if path in context.files:
         return context.files[path]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Inertia, Mesh, Plane, Shape, Sphere
+from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Ground, Inertia, Mesh, Shape, Sphere
 from ddenv.world.pose import Pose, Vector, vector
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import pose_of
@@ -29,10 +30,11 @@ def read_inertia(
     link: Element, link_pose: Pose, collisions: Sequence[Collision], density: Sequence[float], context: Context
 ) -> Inertia:
     """The inertia of a moving link at `link_pose`, in the world frame; `density` (kg/m^3) has one entry per collision."""
-    inertia = _given(link, link_pose, collisions, density, context)
-    if all(isinstance(one.shape, Plane) for one in collisions):
+    evenly = partial(spread, collisions, density, link_pose)
+    inertia = _given(link, link_pose, evenly, context)
+    if all(isinstance(one.shape, Ground) for one in collisions):
         return inertia
-    least = spread(collisions, density, link_pose, LIGHTEST_IN_CONTACT)
+    least = evenly(LIGHTEST_IN_CONTACT)
     solid_enough = f"contacts need at least those of {LIGHTEST_IN_CONTACT:g} kg, spread evenly over its shapes"
     if inertia.mass < least.mass:
         context.note("replaced", link, f"too light, {inertia.mass:.3g} kg: mass and inertia; {solid_enough}")
@@ -46,19 +48,25 @@ def read_inertia(
 
 
 def _given(
-    link: Element, link_pose: Pose, collisions: Sequence[Collision], density: Sequence[float], context: Context
+    link: Element,
+    link_pose: Pose,
+    evenly: Callable[[float | None], Inertia],
+    context: Context,
 ) -> Inertia:
-    """The inertia that the file gives, or where it gives none or an impossible one, that of its shapes."""
+    """The inertia of the file, or where that has none or an impossible one, that of the shapes.
+
+    `evenly` spreads a mass over the shapes.
+    """
     element = link.find("inertial")
     if element is None:
         context.note("replaced", link, f"no <inertial>: {DEFAULT_MASS:g} kg, spread evenly over its shapes")
-        return spread(collisions, density, link_pose, DEFAULT_MASS)
+        return evenly(DEFAULT_MASS)
     mass = number_or_nan(element, "mass", DEFAULT_MASS)
-    if (element.get("auto") or "").strip().lower() in ("1", "true"):
+    if element.get("auto", "").strip().lower() in ("1", "true"):
         given = element.find("mass") is not None and LIGHTEST <= mass <= HEAVIEST
-        return spread(collisions, density, link_pose, mass if given else None)
+        return evenly(mass if given else None)
     if not LIGHTEST <= mass <= HEAVIEST:
-        computed = spread(collisions, density, link_pose, None)
+        computed = evenly(None)
         why = f"{computed.mass:.3g} kg, from its shapes and a density of {WATER:g} kg/m^3"
         context.note("replaced", element, f"mass {mass:g} kg is impossible: {why}")
         return computed
@@ -68,8 +76,7 @@ def _given(
     if place is not None and (place.get("relative_to") or place.get("frame")):
         context.note("ignored", place, "the centre of mass is read in the frame of its link")
     if tensor is not None:
-        moments = vector(number_or_nan(tensor, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
-        products = vector(number_or_nan(tensor, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
+        moments, products = moments_of(tensor)
         if possible := _possible(moments, products):
             return Inertia(mass, link_pose @ pose, possible, products)
     said = "no <inertia>"
@@ -77,7 +84,24 @@ def _given(
         words = (text_of(tensor.find(tag))[:12] or "1" for tag in ("ixx", "iyy", "izz"))
         said = f"moments {' '.join(words)} kg m^2 are impossible"
     context.note("replaced", element, f"{said}: computed from its shapes and its mass of {mass:g} kg")
-    return spread(collisions, density, link_pose, mass)
+    return evenly(mass)
+
+
+def moments_of(inertia: Element) -> tuple[Vector, Vector]:
+    """The moments ixx, iyy, izz and the products ixy, ixz, iyz in an `<inertia>`, kg m^2.
+
+    NaN for what is no number.
+    """
+    moments = vector(number_or_nan(inertia, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
+    products = vector(number_or_nan(inertia, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
+    return moments, products
+
+
+def tensor_of(moments: Vector, products: Vector) -> np.ndarray:
+    """The matrix (3, 3) of moments and products of inertia."""
+    xx, yy, zz = moments
+    xy, xz, yz = products
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def read_density(parent: Element, default: float) -> float:
@@ -103,9 +127,7 @@ def _possible(moments: Vector, products: Vector) -> Vector | None:
 
 def _principal(moments: Vector, products: Vector) -> Vector:
     """The principal moments in ascending order; NaN for unusable numbers."""
-    xx, yy, zz = moments
-    xy, xz, yz = products
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    tensor = tensor_of(moments, products)
     if not np.isfinite(tensor).all() or np.abs(tensor).max() > HEAVIEST:
         return math.nan, math.nan, math.nan
     low, middle, high = np.linalg.eigvalsh(tensor).tolist()
@@ -114,7 +136,7 @@ def _principal(moments: Vector, products: Vector) -> Vector:
 
 def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose: Pose, mass: float | None) -> Inertia:
     """The inertia of solid shapes (overlaps count twice), scaled to `mass` (kg) unless that is None."""
-    pairs = [(one, each) for one, each in zip(collisions, density, strict=True) if not isinstance(one.shape, Plane)]
+    pairs = [(one, each) for one, each in zip(collisions, density, strict=True) if not isinstance(one.shape, Ground)]
     if not pairs:
         return _ball(link_pose, DEFAULT_MASS if mass is None else mass)
     solids = [(*solid(one.shape), one.pose, each) for one, each in pairs]

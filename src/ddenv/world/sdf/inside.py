@@ -9,12 +9,13 @@ import math
 import posixpath
 from collections.abc import Collection, Iterator
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
 from ddenv.world.access import Missing, Unusable
 from ddenv.world.files.resources import Resources
-from ddenv.world.model import Link, Model, Note, Shared, Visual, World, is_ground
+from ddenv.world.model import Collision, Link, Model, Note, Shared, Visual, World, is_ground
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.includes import Part
 from ddenv.world.sdf.xml import Edit, Element, edited, place, tag_end, text_of
@@ -38,8 +39,10 @@ def opened(world: World, root: Element) -> World:
         closed = ""
         if not model.static:
             closed = "it can move"
+        elif len({(link.name, one.name) for link in model.links for one in link.collisions}) == 1:
+            closed = "it is one mesh; 'ddenv world convert' writes its pieces as collisions of their own"
         elif model.name in world.anchors:
-            closed = "other models are placed relative to it"
+            closed = "other models depend on it"
         elif element.tag == "include" or element.find(".//include") is not None:
             closed = "parts of it are in files that cannot be copied into this one; 'ddenv world convert' does it"
         links = {} if closed else dict(_links(element))
@@ -61,31 +64,40 @@ def _links(element: Element, prefix: str = "") -> Iterator[tuple[str, Element]]:
     """The links in a `<model>` and in those nested in it, by the names that `Model.links` has."""
     for child in element:
         if child.tag == "link":
-            yield prefix + (child.get("name") or ""), child
+            yield prefix + child.get("name", ""), child
         elif child.tag == "model":
             yield from _links(child, f"{prefix}{child.get('name')}::")
 
 
 def _parts(model: Model, link: Link, element: Element) -> Iterator[Model]:
-    """The collisions of a link as models, each with the visuals that are nearest to it."""
+    """The collisions of a link as models, each with its pieces, and with the visuals that are nearest to it."""
     named = {tag: {child.get("name"): child for child in element.findall(tag)} for tag in ("collision", "visual")}
     shown: dict[int, list[Visual]] = {}
     for visual in link.visuals if link.collisions else ():
         gaps = [math.dist(visual.pose.position, one.pose.position) for one in link.collisions]
         shown.setdefault(gaps.index(min(gaps)), []).append(visual)
     prefix = "/".join([model.name, *link.name.split("::")]) if len(model.links) > 1 else model.name
-    for number, collision in enumerate(link.collisions):
-        visuals = tuple(shown.get(number, ()))
-        elements = [named["collision"][collision.name], *(named["visual"][visual.name] for visual in visuals)]
+    whole = [list(pieces) for _, pieces in groupby(enumerate(link.collisions), key=_mesh_or_number)]
+    for numbered in whole:
+        name = numbered[0][1].name
+        visuals = tuple(visual for number, _ in numbered for visual in shown.get(number, ()))
+        elements = [named["collision"][name], *(named["visual"][visual.name] for visual in visuals)]
+        pieces = tuple(piece for _, piece in numbered)
         yield replace(
             model,
-            name=prefix if len(link.collisions) == 1 < len(model.links) else f"{prefix}/{collision.name}",
-            pose=collision.pose,
-            links=(replace(link, collisions=(collision,), visuals=visuals),),
+            name=prefix if len(whole) == 1 < len(model.links) else f"{prefix}/{name}",
+            pose=pieces[0].pose,
+            links=(replace(link, collisions=pieces, visuals=visuals),),
             spans=tuple((one.start, one.end) for one in elements),
             line=elements[0].line,
             inside=model.name,
         )
+
+
+def _mesh_or_number(numbered: tuple[int, Collision]) -> tuple[str, int]:
+    """What the pieces of one `<collision>` have in common, and no others."""
+    number, collision = numbered
+    return ("", number) if collision.piece is None else (collision.name, id(collision.piece.mesh))
 
 
 def _emptied(model: Model, element: Element, links: dict[str, Element], parts: list[Model]) -> Iterator[Shared]:

@@ -106,7 +106,8 @@ def _end(element: Element, tag: str, spot: Spot, links: dict[str, LinkPose]) -> 
         return WORLD
     link = spot.scope.link(name, element) if name else None
     if link is None or spot.prefix + link not in links:
-        raise complain(element if child is None else child, f"<{tag}> is not a link of this model: '{name[:80]}'")
+        wrong = element if child is None else child
+        raise complain(wrong, f"<{tag}> is not a link of this model: '{name}'")
     return spot.prefix + link
 
 

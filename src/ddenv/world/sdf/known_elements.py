@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from ddenv.world.tinyxml import Element
+from ddenv.world.sdf.xml import Element, text_of
 
 TABLE = Path(__file__).with_name("known_elements.txt")
 _ENTRY = re.compile(r"([^@:!]+)((?:@[^@:!]+)*)(?::(\w+))?(!?)")
@@ -48,9 +48,9 @@ def known_children() -> dict[str, dict[str, Known]]:
 def fault(element: Element, known: Known) -> str:
     """What the checker refuses in the attributes and the text of `element`; empty if nothing."""
     for attribute in known.attributes:
-        if not (element.get(attribute) or "").strip():
+        if not element.get(attribute, "").strip():
             return f"a <{element.tag}> without its {attribute}"
-    text = (element.text or "").strip()
+    text = text_of(element)
     if not text:
         return f"an empty <{element.tag}>" if known.required else ""
     if known.kind == "pose":
@@ -81,9 +81,7 @@ def _is_whole(text: str, bits: int) -> bool:
 
 def _is_color(text: str) -> bool:
     words = text.split()
-    if len(words) not in (3, 4) or not all(map(_is_number, words)):
-        return False
-    return all(_in_unit_range(word) for word in words)
+    return len(words) in (3, 4) and all(_is_number(word) and _in_unit_range(word) for word in words)
 
 
 def _in_unit_range(word: str) -> bool:

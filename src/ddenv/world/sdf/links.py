@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.world.extent import around, shape_bounds
-from ddenv.world.model import Box, Collision, Link, Visual
+from ddenv.world.model import Box, Collision, Link, Mesh, Piece, Visual
 from ddenv.world.pose import HERE, Pose, vector
 from ddenv.world.sdf.context import Context, note_unread
 from ddenv.world.sdf.frames import pose_of
@@ -54,7 +54,7 @@ GAZEBO_COLORS: dict[str, tuple[float, float, float]] = {
 }
 
 
-def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local: Pose, *, moving: bool) -> Link:
+def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local: Pose) -> Link:
     """The link of `element` in the model at `spot`, with its `pose` in the world, and `local` in its model. Raises UserError."""
     note_unread(element, context)
     items = []
@@ -69,16 +69,13 @@ def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local:
     usual = WATER if inertial is None else read_density(inertial, WATER)
     collisions, density, visuals = [], [], []
     for item in items:
-        if item.element.tag == "collision":
-            placed = _settled(item, items, element, context)
-            if placed is not None and can_be_touched(item.element, context):
-                mu = read_friction(item.element, context)
-                place = pose @ item.pose @ placed.offset
-                collisions.append(Collision(name_of(item.element), placed.shape, place, mu))
-                density.append(read_density(item.element, usual))
-    inertia = read_inertia(element, pose, collisions, density, context) if moving else None
+        if item.element.tag == "collision" and (placed := _settled(item, items, element, context)) is not None:
+            solids = _collisions(item, placed, pose, context)
+            collisions += solids
+            density += [read_density(item.element, usual)] * len(solids)
+    inertia = None if spot.static else read_inertia(element, pose, collisions, density, context)
     kinematic = element.find("kinematic")
-    if kinematic is not None and moving and truth(element, "kinematic", False):
+    if kinematic is not None and not spot.static and truth(element, "kinematic", False):
         context.note("ignored", kinematic, "forces move it like any other link")
     for item in items:
         if isinstance(item.shape, Lost) and item.element.tag == "visual":
@@ -96,6 +93,18 @@ class _Item:
     element: Element
     pose: Pose
     shape: Placed | Lost | None
+
+
+def _collisions(item: _Item, placed: Placed, pose: Pose, context: Context) -> list[Collision]:
+    """The shapes of a `<collision>` of the link at `pose`; none if nothing can touch it. Raises UserError."""
+    if not can_be_touched(item.element, context):
+        return []
+    mu = read_friction(item.element, context)
+    place = pose @ item.pose @ placed.offset
+    name = name_of(item.element)
+    if not isinstance(placed.shape, Mesh) or not placed.pieces:
+        return [Collision(name, placed.shape, place, mu)]
+    return [Collision(name, shape, place @ offset, mu, Piece(placed.shape, offset)) for shape, offset in placed.pieces]
 
 
 def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -> Placed | None:
@@ -204,7 +213,7 @@ def read_color(visual: Element) -> Color | None:
     for tag in ("material/diffuse", "material/ambient"):
         element = visual.find(tag)
         if element is not None and text_of(element):
-            count = 4 if len((element.text or "").split()) == 4 else 3
+            count = 4 if len(text_of(element).split()) == 4 else 3
             red, green, blue, *alpha = (min(max(value, 0.0), 1.0) for value in numbers(element, count))
             # Many files have colours with an alpha of zero, which the simulators that wrote them ignored.
             return red, green, blue, ((alpha or [1.0])[0] or 1.0) * opacity

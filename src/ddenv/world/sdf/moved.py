@@ -24,20 +24,25 @@ def with_places(world: World, places: Mapping[str, Sequence[Pose]], reading: Rea
     """The text of `world` with the links of some models at `places`, and the names of those that could not be moved.
 
     `places` are the poses of all links of a model in the world frame; `reading` is how the world was read. A model whose links
-    moved against each other can only be moved if `<state>` holds its links; one that others are placed relative to stays.
+    moved against each other can only be moved if `<state>` holds its links; one that others depend on stays.
     """
     asked = {name: there for name, there in places.items() if name not in world.anchors}
-    wanted = {model.name: [link.pose for link in model.links] for model in world.models}
+    wanted = link_poses(world)
     while True:
         moved = {name: there for name, there in asked.items() if not _are_same(wanted[name], there)}
         text = _written(world, moved)
         again = parse_world(text, world.path, reading, Resources(world.resources))
         # What was written is read again: only that shows that each model is where it has to be.
-        found = {model.name: [link.pose for link in model.links] for model in again.models}
+        found = link_poses(again)
         wrong = {name for name, there in found.items() if not _are_same(there, moved.get(name, wanted[name]))}
         if not wrong & set(asked):
             return text, [name for name, there in places.items() if not _are_same(found[name], there)]
         asked = {name: there for name, there in asked.items() if name not in wrong}
+
+
+def link_poses(world: World) -> dict[str, list[Pose]]:
+    """The poses of all links in the world frame, by model."""
+    return {model.name: [link.pose for link in model.links] for model in world.models}
 
 
 def _are_same(poses: Sequence[Pose], others: Sequence[Pose]) -> bool:

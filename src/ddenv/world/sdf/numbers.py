@@ -25,7 +25,16 @@ from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario, Sensors
 from ddenv.world.sdf.moved import with_places
 from ddenv.world.sdf.read import parse_world
-from ddenv.world.sdf.xml import Edit, Element, edited, floats, parse, with_child, with_words
+from ddenv.world.sdf.xml import (
+    Edit,
+    Element,
+    edited,
+    floats,
+    parse,
+    text_of,
+    with_child,
+    with_words,
+)
 from ddenv.world.whole import whole_of
 
 # Less than this part of a number does not matter, unless it is a place or an angle.
@@ -135,7 +144,7 @@ def chosen(numbers: Mapping[str, Number], globs: Iterable[str]) -> list[Number]:
     globs = list(globs)
     for glob in globs:
         if not any(fnmatchcase(name, glob) for name in numbers):
-            near = nearest(glob, list(numbers))
+            near = nearest(glob, numbers)
             raise UserError(f"--number: there is no number '{glob}'{near}; examples: {', '.join(list(numbers)[:3])}")
     return [one for name, one in numbers.items() if not globs or any(fnmatchcase(name, glob) for glob in globs)]
 
@@ -227,7 +236,7 @@ def _with(scenario: Scenario, world: World, name: str, value: float) -> World:
     model = world.model(owner)
     at = next(one for one in parse(world.text, world.path).iter() if one.start == model.spans[0][0])
     number, pose = f"{value:.9g}", at.find("pose")
-    words = [] if pose is None else (pose.text or "").split()
+    words = text_of(pose).split()
     if what == "friction":
         edits = [edit for collision in at.iter("collision") for edit in _friction(world.text, collision, number)]
     elif what not in ("x", "y", "z", "yaw"):
@@ -264,7 +273,7 @@ def _sizes(world: World, model: Model, at: Element, what: str, number: str) -> I
     now = _of_model(world, model, what)
     tag, place = ("size", "xyz".index(what[-1])) if what in SIZES[2:] else (what, 0)
     for element in at.iter(tag):
-        values, words = floats(element), (element.text or "").split()
+        values, words = floats(element), text_of(element).split()
         of_shape = element.parent is not None and element.parent.tag in ("box", "cylinder", "sphere")
         if len(values) > place and values[place] == now and (of_shape or what == "mass"):
             yield with_words(world.text, element, " ".join([*words[:place], number, *words[place + 1 :]]))

@@ -14,6 +14,7 @@ from ddenv.world.access import Missing, Unusable, is_directives
 from ddenv.world.files.resources import Resources
 from ddenv.world.model import World
 from ddenv.world.sdf.context import sdf_root, version
+from ddenv.world.sdf.inertia import moments_of, tensor_of
 from ddenv.world.sdf.known_elements import fault, known_children
 from ddenv.world.sdf.xml import Element, number_or_nan, parse, place, text_of
 
@@ -51,21 +52,18 @@ class _Checker:
 
     def check(self, root: Element) -> Iterator[Refusal]:
         """What is refused in a file, and in all that it includes."""
-        pending = {root.source: root}
-        checked: set[Path] = set()
-        while pending:
-            source, root = pending.popitem()
-            checked.add(source)
-            yield from self._inside(root, version(root) >= (1, 8), is_known=True)
-            for include in root.iter("include"):
+        roots = [root]
+        for each in roots:
+            yield from self._inside(each, version(each) >= (1, 8), is_known=True)
+            for include in each.iter("include"):
                 included = self._root_of(include)
-                if included is not None and included.tag == "sdf" and included.source not in checked:
-                    pending[included.source] = included
+                if included is not None and included.tag == "sdf" and included not in roots:
+                    roots.append(included)
 
     def _inside(self, element: Element, no_colons: bool, *, is_known: bool) -> Iterator[Refusal]:
         """What is refused below `element`. Nothing is known of what an element holds that is not `is_known` itself."""
         yield from self._names(element, no_colons)
-        if element.tag == "inertial" and element.find("inertia") is not None and not _is_accepted(element):
+        if element.tag == "inertial" and not _is_accepted(element):
             yield "an inertia that no body has", element
         known = known_children().get(element.tag, {}) if is_known else {}
         for child in element:
@@ -79,12 +77,13 @@ class _Checker:
 
     def _names(self, element: Element, no_colons: bool) -> Iterator[Refusal]:
         names: set[str] = set()
-        twice = None
+        repeated: list[Element] = []
         for child in element:
             name = self._name(child)
             if child.tag == "plugin" or name is None:
                 continue
-            twice = child if twice is None and name in names else twice
+            if name in names:
+                repeated.append(child)
             names.add(name)
             if no_colons and "::" in name and child.tag != "include":
                 yield "'::' in a name", child
@@ -92,15 +91,15 @@ class _Checker:
                 yield "a name that is reserved", child
             if child.tag in TYPES and child.get("type") not in (None, *TYPES[child.tag]):
                 yield f"a <{child.tag}> of an unknown type", child
-        if twice is not None:
-            yield f"a <{element.tag}> with two parts of the same name", twice
+        if repeated:
+            yield f"a <{element.tag}> with two parts of the same name", repeated[0]
 
     def _frame(self, frame: Element, holder: Element) -> Iterator[Refusal]:
         pose = frame.find("pose")
-        to = frame.get("attached_to") or ""
+        to = frame.get("attached_to", "")
         if to and (to == frame.get("name") or not self._holds(holder, to)):
             yield "a <frame> that is attached to nothing", frame
-        relative_to = "" if pose is None else pose.get("relative_to") or ""
+        relative_to = "" if pose is None else pose.get("relative_to", "")
         if relative_to and not self._holds(holder, relative_to):
             yield "a <frame> whose pose is relative to nothing", frame
 
@@ -151,15 +150,17 @@ class _Checker:
 
 def _is_accepted(inertial: Element) -> bool:
     """Whether neither the mass nor a moment is negative, and no moment exceeds the sum of the other two."""
-    xx, yy, zz = (number_or_nan(inertial, f"inertia/{tag}", 1.0) for tag in ("ixx", "iyy", "izz"))
-    xy, xz, yz = (number_or_nan(inertial, f"inertia/{tag}", 0.0) for tag in ("ixy", "ixz", "iyz"))
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    inertia = inertial.find("inertia")
+    if inertia is None:
+        return True
+    moments, products = moments_of(inertia)
+    tensor = tensor_of(moments, products)
     largest = np.abs(tensor).max()
     if not (number_or_nan(inertial, "mass", 1.0) >= 0.0 and math.isfinite(largest)):
         return False
     # Numbers near the largest ones would overflow.
     tensor /= largest or 1.0
     # Without products these are the moments themselves, unrounded.
-    low, middle, high = np.linalg.eigvalsh(tensor) if any((xy, xz, yz)) else np.sort(np.diag(tensor))
+    low, middle, high = np.linalg.eigvalsh(tensor) if any(products) else np.sort(np.diag(tensor))
     slack = SLACK * abs(np.trace(tensor))
     return bool(low >= -slack and high <= low + middle + slack)

@@ -23,16 +23,12 @@ from ddenv.world.sdf.assemble import assemble, state_entries
 from ddenv.world.sdf.context import Context, how_to_include, note_unread, sdf_root
 from ddenv.world.sdf.frames import FARTHEST, Scope, TooFar
 from ddenv.world.sdf.inside import has_includes, opened, with_copies
+from ddenv.world.sdf.population import copies
 from ddenv.world.sdf.urdf import root_of, without_mass
 from ddenv.world.sdf.welds import parse_directives
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse
 
 GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
-# Elements that add or join models in a way that is not supported, with the error message.
-REFUSED = {
-    "population": "<population> is not supported; write its models out",
-    "joint": "joints between models are not supported; put both models into one",
-}
 
 
 def read_world(path: Path, reading: Reading = PLAIN) -> World:
@@ -89,12 +85,14 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         instead = f"; to use its model in a world, {how_to_include(path)}" if root.find("model") is not None else ""
         raise UserError(f"{path}: expected one <world> inside <sdf>, found {found}{instead}")
     world = worlds[0]
-    for tag, message in REFUSED.items():
-        refused = world.find(tag)
-        if refused is not None:
-            raise complain(refused, message)
+    joint = world.find("joint")
+    if joint is not None:
+        raise complain(joint, "joints between models are not supported; put both models into one")
     note_unread(world, context)
     scope = Scope(world, (path,), context)
+    clones = [part for population in world.findall("population") for part in copies(population, (path,), context)]
+    scope.parts += clones
+    copied = {clone.at.start for clone in clones}
     models = _models(scope, state_entries(world), context)
     context.complain_of_missing()
     context.model = ""
@@ -108,13 +106,9 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         gravity=GRAVITY if gravity is None else vector(numbers(gravity, 3)),
         models=models,
         version=root.get("version") or "",
-        notes=tuple(context.notes),
-        anchors=frozenset(model.name for model in models if model.name in anchors),
-        resources=context.resources.taken,
-        found=tuple(context.resources.found.values()),
-        absent=context.resources.absent(),
-        guessed=tuple(context.guessed),
+        anchors=frozenset(model.name for model in models if model.name in anchors or model.spans[0][0] in copied),
     )
+    whole = context.recorded(whole)
     return _opened(whole, root, scope, context) if context.reading.inside else whole
 
 

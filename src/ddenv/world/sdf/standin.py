@@ -16,8 +16,20 @@ from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.xml import Element, number_or_nan
 
 # The sizes (m) of each kind, as shown in error messages.
-SIZES = {"box": "x,y,z", "cylinder": "radius,length", "sphere": "radius"}
-SIZES |= {"capsule": "radius,length", "ellipsoid": "x,y,z"}
+SIZES = {
+    "box": "x,y,z",
+    "cylinder": "radius,length",
+    "sphere": "radius",
+    "capsule": "radius,length",
+    "ellipsoid": "x,y,z",
+}
+SHAPES: dict[str, Callable[..., Shape]] = {
+    "box": lambda *size: Box(size),
+    "cylinder": Cylinder,
+    "sphere": Sphere,
+    "capsule": Capsule,
+    "ellipsoid": lambda x, y, z: Ellipsoid((x / 2, y / 2, z / 2)),
+}
 SIBLINGS = ("visual", "collision")
 AUTO, NONE = "auto", "none"
 # In place of a URI: everything that is missing.
@@ -28,10 +40,14 @@ HOW = f"{', '.join(f'{kind}:{sizes}' for kind, sizes in SIZES.items())} (m), vis
 
 @dataclass(frozen=True)
 class Placed:
-    """A shape and where it is in the frame of its `<collision>` or `<visual>`, or of what it stands in for."""
+    """A shape and where it is in the frame of its `<collision>` or `<visual>`, or of what it stands in for.
+
+    `pieces` are the convex shapes that collide in place of `shape` if that is a mesh that is not convex; none for any other.
+    """
 
     shape: Shape
     offset: Pose = HERE
+    pieces: tuple[tuple[Shape, Pose], ...] = ()
 
 
 # A shape, or a word: `visual` and `collision` are the box around these shapes of the link, `none` leaves it out, and `auto` guesses
@@ -68,6 +84,11 @@ def parse_stand_in(text: str, where: str) -> StandIn:
     """
     if text in (*SIBLINGS, AUTO, NONE):
         return text
+    return placed(text, where)
+
+
+def placed(text: str, where: str) -> Placed:
+    """The shape of `kind:sizes` or `kind:sizes@x,y,z`. Raises UserError beginning with `where`."""
     kind, _, rest = text.partition(":")
     words, at, center = rest.partition("@")
     if kind not in SIZES:
@@ -75,12 +96,11 @@ def parse_stand_in(text: str, where: str) -> StandIn:
     sizes = _numbers(words, SIZES[kind], f"{where}: {kind}")
     if min(sizes) <= 0:
         raise UserError(f"{where}: {kind}: sizes must be positive, found '{words[:60]}'")
-    kinds: dict[str, Callable[..., Shape]] = {"cylinder": Cylinder, "sphere": Sphere, "capsule": Capsule}
-    shape = kinds[kind](*sizes) if kind in kinds else Box(vector(sizes))
-    if kind == "ellipsoid":
-        shape = Ellipsoid(vector(size / 2 for size in sizes))
-    above = (0.0, 0.0, shape_bounds(shape, HERE)[1][2])
-    return Placed(shape, Pose(vector(_numbers(center, "x,y,z", f"{where}: the centre after @") if at else above)))
+    shape = SHAPES[kind](*sizes)
+    if at:
+        place = _numbers(center, "x,y,z", f"{where}: the centre after @")
+        return Placed(shape, Pose(vector(place)))
+    return Placed(shape, Pose(vector((0.0, 0.0, shape_bounds(shape, HERE)[1][2]))))
 
 
 def _numbers(text: str, names: str, where: str) -> tuple[float, ...]:
@@ -115,17 +135,15 @@ def guess(uri: str, link: Element | None = None) -> tuple[Placed, str, str, Vect
     It stands where the mesh would, and has the size of a mesh of that scale; without a scale, at the link's centre of mass.
     None for a floor of which nothing says how large it is.
     """
-    text, scale = KNOWN_SIZES.get(model_named(uri), (SOME, ONE))
-    why, box = "the size of Gazebo's model", None
-    if text == SOME:
-        box = None if link is None else _box_of_inertia(link)
-        if box is None and is_floor(uri):
-            return None
-        text = box or SOME
-        why = "the box that has the link's inertia" if box else "nothing says how large it is"
-    stand_in = parse_stand_in(text, "guess")
-    assert isinstance(stand_in, Placed)
-    return stand_in, text, why, None if box else scale
+    model = model_named(uri)
+    if known := KNOWN_SIZES.get(model):
+        scale = MESH_SCALES.get(model, ONE)
+        return placed(known, "guess"), known, "the size of Gazebo's model", scale
+    if link is not None and (box := _box_of_inertia(link)):
+        return placed(box, "guess"), box, "the box that has the link's inertia", None
+    if is_floor(uri):
+        return None
+    return placed(SOME, "guess"), SOME, "nothing says how large it is", ONE
 
 
 def is_floor(uri: str) -> bool:
@@ -149,26 +167,30 @@ def _box_of_inertia(link: Element) -> str | None:
 
 # From the collisions and meshes in github.com/osrf/gazebo_models: the box around the model, or the cylinder. Of the barrel
 # without its flat foot, which has a radius of 0.51 m. Only models whose mesh has the frame of the model.
-# The text of the stand-in, in the frame of the model as of its mesh; and the scale that draws the mesh in that size.
-KNOWN_SIZES: dict[str, tuple[str, Vector]] = {
-    "asphalt_plane": ("box:20,20,0.1@0,0,0", ONE),
-    "beer": ("cylinder:0.055,0.23@0,0,0", ONE),
-    "bookshelf": ("box:0.92,0.405,1.2@0,-0.1925,0.6", ONE),
-    "brick_box_3x1x3": ("box:3,1,3", ONE),
-    "cabinet": ("box:0.47,0.49,1.02@0.01,0,0.51", ONE),
-    "cafe_table": ("box:0.913,0.913,0.775", ONE),
-    "cardboard_box": ("box:0.5,0.4,0.3", (1.259, 1.007, 0.756)),
-    "cinder_block": ("box:0.435,0.203,0.203", ONE),
-    "cinder_block_2": ("box:0.194,0.397,0.143", ONE),
-    "cinder_block_wide": ("box:0.387,0.387,0.143", ONE),
-    "construction_barrel": ("cylinder:0.296,1.315", ONE),
-    "construction_cone": ("cylinder:0.251,1.089", (10.0, 10.0, 10.0)),
-    "cricket_ball": ("sphere:0.0375", ONE),
-    "drc_practice_2x4": ("box:1.219,0.038,0.089@0,0,0", ONE),
-    "drc_practice_2x6": ("box:1.219,0.038,0.14@0,0,0", ONE),
-    "drc_practice_4x4x20": ("box:0.508,0.089,0.089@0,0,0", ONE),
-    "drc_practice_4x4x40": ("box:1.016,0.089,0.089@0,0,0", ONE),
-    "jersey_barrier": ("box:4.065,0.811,1.143", ONE),
-    "table": ("box:1.5,0.8,1.015", ONE),
-    "wood_cube_10cm": ("box:0.1,0.1,0.1", ONE),
+KNOWN_SIZES = {
+    "asphalt_plane": "box:20,20,0.1@0,0,0",
+    "beer": "cylinder:0.055,0.23@0,0,0",
+    "bookshelf": "box:0.92,0.405,1.2@0,-0.1925,0.6",
+    "brick_box_3x1x3": "box:3,1,3",
+    "cabinet": "box:0.47,0.49,1.02@0.01,0,0.51",
+    "cafe_table": "box:0.913,0.913,0.775",
+    "cardboard_box": "box:0.5,0.4,0.3",
+    "cinder_block": "box:0.435,0.203,0.203",
+    "cinder_block_2": "box:0.194,0.397,0.143",
+    "cinder_block_wide": "box:0.387,0.387,0.143",
+    "construction_barrel": "cylinder:0.296,1.315",
+    "construction_cone": "cylinder:0.251,1.089",
+    "cricket_ball": "sphere:0.0375",
+    "drc_practice_2x4": "box:1.219,0.038,0.089@0,0,0",
+    "drc_practice_2x6": "box:1.219,0.038,0.14@0,0,0",
+    "drc_practice_4x4x20": "box:0.508,0.089,0.089@0,0,0",
+    "drc_practice_4x4x40": "box:1.016,0.089,0.089@0,0,0",
+    "jersey_barrier": "box:4.065,0.811,1.143",
+    "table": "box:1.5,0.8,1.015",
+    "wood_cube_10cm": "box:0.1,0.1,0.1",
+}
+# The scales that draw their meshes in these sizes, if not 1.
+MESH_SCALES: dict[str, Vector] = {
+    "cardboard_box": (1.259, 1.007, 0.756),
+    "construction_cone": (10.0, 10.0, 10.0),
 }

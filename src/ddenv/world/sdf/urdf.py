@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,7 +45,7 @@ def to_sdf(robot: Element, context: Context) -> Element:
         raise complain(robot, "has no <link>")
     origins, joints = {}, []
     for source in robot.findall("joint"):
-        parent, child = (_end(source, tag, list(links)) for tag in ("parent", "child"))
+        parent, child = (_end(source, tag, links) for tag in ("parent", "child"))
         origins[child] = pose(source, parent)
         joints.append(joint_of(source, parent, child))
     roots = [name for name in links if name not in origins]
@@ -157,20 +158,20 @@ def _material(part: Element, robot: Element) -> list[Element]:
     return [twin(own[0], element("diffuse", color, given(color, "rgba"))) for color in colors[:1]]
 
 
-def _end(joint: Element, tag: str, links: list[str]) -> str:
+def _end(joint: Element, tag: str, links: Collection[str]) -> str:
     """The name of the parent or the child link of `joint`. Raises UserError."""
     end = joint.find(tag)
     if end is None:
         raise complain(joint, f"has no <{tag}>")
     name = given(end, "link")
     if name not in links:
-        raise complain(end, f"there is no link '{name[:80]}'{nearest(name[:80], links[:500])}")
+        raise complain(end, f"there is no link '{name}'{nearest(name, links)}")
     return name
 
 
 def joint_of(source: Element, parent: str, child: str) -> Element:
     """The SDF joint for a URDF one. Raises UserError."""
-    kind = (source.get("type") or "").strip()
+    kind = source.get("type", "").strip()
     if kind not in KINDS:
         raise complain(source, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
     ends = element("parent", source, parent), element("child", source, child)

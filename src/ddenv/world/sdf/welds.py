@@ -6,7 +6,6 @@ welded to one that can move is one body with that, and so a part of it.
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -18,8 +17,8 @@ from yaml.nodes import Node
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.world.model import Joint, Link, Model, Shared, World, held_with
-from ddenv.world.pose import HERE, Pose
-from ddenv.world.sdf.assemble import assemble
+from ddenv.world.pose import HERE, Pose, turn, vector
+from ddenv.world.sdf.assemble import assemble, still
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.directives import WORLD, WORLD_INSTANCE, Directive, Source, Span, opened, spans_of
 from ddenv.world.sdf.frames import Scope
@@ -68,7 +67,8 @@ class _Builder:
     scopes: dict[int, Scope] = field(default_factory=dict)
     frames: dict[str, Frame] = field(default_factory=lambda: {f"{WORLD_INSTANCE}::{WORLD}": Frame()})
     instances: set[str] = field(default_factory=lambda: {WORLD_INSTANCE})
-    roots: dict[Group, str] = field(default_factory=dict)
+    # By model and link.
+    groups: dict[tuple[str, str], Group] = field(default_factory=dict)
     fixings: dict[Group, Fixing] = field(default_factory=dict)
     spans: dict[str, list[Span]] = field(default_factory=lambda: defaultdict(list))
     filters: list[Directive] = field(default_factory=list)
@@ -86,7 +86,7 @@ class _Builder:
             case "add_model":
                 self._add_model(one)
             case "add_model_instance":
-                self._claim(source.scoped(source.text_of(keys["name"])), source, keys["name"])
+                self._new_model(one)
             case "add_frame":
                 self._add_frame(one)
             case "add_weld":
@@ -103,17 +103,21 @@ class _Builder:
                 name = source.inner(keys)
                 if name and name not in self.instances:
                     node = keys.get("model_namespace", one.node)
-                    raise source.complain(node, f"there is no model instance '{name[:80]}' for the namespace")
+                    why = f"there is no model instance '{name}' for the namespace"
+                    raise source.complain(node, why)
 
-    def _claim(self, name: str, source: Source, node: Node) -> None:
+    def _new_model(self, one: Directive) -> str:
+        """The name of the model that `one` adds. Raises UserError if it is taken."""
+        node = one.keys["name"]
+        name = one.source.name_of(node)
         if name in self.instances or name == "DefaultModelInstance":
-            raise source.complain(node, f"the model '{name[:80]}' is added twice")
+            raise one.source.complain(node, f"the model '{name}' is added twice")
         self.instances.add(name)
+        return name
 
     def _add_model(self, one: Directive) -> None:
         source, keys = one.source, one.keys
-        name = source.scoped(source.text_of(keys["name"]))
-        self._claim(name, source, keys["name"])
+        name = self._new_model(one)
         at = source.path, int(one.node.start_mark.line) + 1, one.span
         include, uri = _element("add_model", *at), _element("uri", *at)
         uri.text = source.text_of(keys["file"])
@@ -127,9 +131,10 @@ class _Builder:
         part = replace(part, name=name)
         outer = Scope(_element(WORLD, *at), (source.path,), self.context, self.scopes)
         model = without_mass(assemble(part, name, outer, None, self.context), part.element)
-        positions = source.pairs(keys["default_joint_positions"]) if "default_joint_positions" in keys else {}
+        positions = source.pairs(keys.get("default_joint_positions"))
         model, turned = _at_positions(model, positions, source)
-        self.models[name], self.elements[name] = model, include
+        self.models[name] = model
+        self.elements[name] = include
         self.spans[name].append(one.span)
         for own, pose, held in _frames(outer.inside(part), outer.placed(part), ""):
             if own != OWN_FRAME or not is_urdf(part.element):
@@ -141,25 +146,24 @@ class _Builder:
             root = link.name
             while root in parents:
                 root = parents[root]
-            self.roots[name, link.name] = root
-        free = source.pairs(keys["default_free_body_pose"]) if "default_free_body_pose" in keys else {}
-        for body, value in free.items():
+            self.groups[name, link.name] = name, root
+        for body, value in source.pairs(keys.get("default_free_body_pose")).items():
             frame = self.frames.get(f"{name}::{body}")
             if frame is None or "::" in body:
-                raise source.complain(value, f"there is no body '{body[:80]}' in '{name[:80]}'")
+                raise source.complain(value, f"there is no body '{body}' in '{name}'")
             base, pose = source.pose(value)
             there = Frame() if base is None else self._frame(base, source)
             self._fix(Fixing(frame, there, pose, partial(source.complain, value), weld=False))
 
     def _frame(self, node: Node, source: Source) -> Frame:
         """The frame that `node` names. Raises UserError."""
-        name = source.scoped(source.text_of(node))
+        name = source.name_of(node)
         found = [each for each in self.frames if name == (each if "::" in name else each.rpartition("::")[2])]
         if not found:
-            near = nearest(name[:80], list(self.frames)[:500])
-            raise source.complain(node, f"there is no frame '{name[:80]}' here{near}")
+            hint = nearest(name, self.frames)
+            raise source.complain(node, f"there is no frame '{name}' here{hint}")
         if len(found) > 1:
-            raise source.complain(node, f"'{name[:80]}' may be {' or '.join(found[:3])}")
+            raise source.complain(node, f"'{name}' may be {' or '.join(found[:3])}")
         return self.frames[found[0]]
 
     def _add_frame(self, one: Directive) -> None:
@@ -173,7 +177,7 @@ class _Builder:
         if instance:
             instance = source.scoped(instance)
             if instance not in self.instances:
-                raise source.complain(one.keys["name"], f"there is no model instance '{instance[:80]}'")
+                raise source.complain(one.keys["name"], f"there is no model instance '{instance}'")
             words = instance.split("::")
             owners |= {name for end in range(len(words)) if (name := "::".join(words[: end + 1])) in self.models}
         else:
@@ -181,45 +185,44 @@ class _Builder:
             instance = "::".join(each for each in (there.model or WORLD_INSTANCE, inner) if each)
         full = f"{instance}::{last}"
         if full in self.frames:
-            raise source.complain(one.keys["name"], f"there already is a frame '{full[:80]}'")
+            raise source.complain(one.keys["name"], f"there already is a frame '{full}'")
         self.frames[full] = Frame(there.model, there.link, there.pose @ pose, owners)
         for owner in owners:
             self.spans[owner].append(one.span)
 
     def _fix(self, fixing: Fixing) -> None:
         name, link = fixing.own.model, fixing.own.link
-        key, model = (name, self.roots[name, link]), self.models[name]
-        before = self.fixings.get(key)
-        if model.static or any(
-            joint.parent == WORLD for joint in model.joints if self.roots[name, joint.child] == key[1]
-        ):
-            raise fixing.complain(f"'{name[:80]}' is fixed to the world by its own file")
+        group, model = self.groups[name, link], self.models[name]
+        before = self.fixings.get(group)
+        held = {self.groups[name, joint.child] for joint in model.joints if joint.parent == WORLD}
+        if model.static or group in held:
+            raise fixing.complain(f"'{name}' is fixed to the world by its own file")
         if before is not None and (before.weld or not fixing.weld or before.base.model):
-            raise fixing.complain(f"'{name[:80]}' is placed twice")
-        if not (fixing.weld or fixing.base.model or link == key[1]):
-            raise fixing.complain(f"'{link[:80]}' is not free: joints hold it")
-        self.fixings[key] = fixing
+            raise fixing.complain(f"'{name}' is placed twice")
+        if not (fixing.weld or fixing.base.model or link == group[1]):
+            raise fixing.complain(f"'{link}' is not free: joints hold it")
+        self.fixings[group] = fixing
 
     # Where all of it is.
 
-    def _place(self, key: Group) -> Pose:
+    def _place(self, group: Group) -> Pose:
         """How far a group of links moves from the place where its own file puts it. Raises UserError."""
-        fixing = self.fixings.get(key)
+        fixing = self.fixings.get(group)
         if fixing is None:
             return HERE
-        if key not in self.places:
-            self.places[key] = None
-            self.places[key] = self._pose(fixing.base) @ fixing.pose @ fixing.own.pose.inverse()
-        place = self.places[key]
+        if group not in self.places:
+            self.places[group] = None
+            self.places[group] = self._pose(fixing.base) @ fixing.pose @ fixing.own.pose.inverse()
+        place = self.places[group]
         if place is None:
-            raise fixing.complain(f"the place of '{key[0][:80]}' depends on itself")
+            raise fixing.complain(f"the place of '{group[0]}' depends on itself")
         return place
 
     def _pose(self, frame: Frame) -> Pose:
         """The pose of `frame` in the world."""
         if not frame.model:
             return frame.pose
-        return self._place((frame.model, self.roots[frame.model, frame.link])) @ frame.pose
+        return self._place(self.groups[frame.model, frame.link]) @ frame.pose
 
     def finish(self, name: str) -> Model:
         """The model `name` at its place, with its welds to what does not move. Raises UserError."""
@@ -233,9 +236,9 @@ class _Builder:
 
     def _finished(self, name: str) -> Model:
         model = self.models[name]
-        place = {link.name: self._place((name, self.roots[name, link.name])) for link in model.links}
+        place = {link.name: self._place(self.groups[name, link.name]) for link in model.links}
         joints = [_moved_joint(joint, place[joint.child]) for joint in model.joints]
-        groups = dict.fromkeys((name, self.roots[name, link.name]) for link in model.links)
+        groups = dict.fromkeys(self.groups[name, link.name] for link in model.links)
         for fixing in (self.fixings[group] for group in groups if group in self.fixings):
             base = fixing.base
             others = (fixing.own.owners | base.owners) - {name}
@@ -244,25 +247,30 @@ class _Builder:
                 continue
             at = fixing.own.link
             joints = _hung_from(at, joints)
+            weld = Joint(f"{at} (weld)", "fixed", WORLD, at, self._pose(base))
             if base.model == name:
-                joints.append(Joint(f"{at} (weld)", "fixed", base.link, at, self._pose(base)))
+                joints.append(replace(weld, parent=base.link))
             elif base.model and not _holds(self.finish(base.model), base.link):
                 if name in self.carriers:
-                    raise fixing.complain(f"'{name[:80]}' is welded to two models that can move")
+                    raise fixing.complain(f"'{name}' is welded to two models that can move")
                 outer, parent = base.model, base.link
                 if outer in self.carriers:
                     outer, parent = self.carriers[outer][0], f"{outer}::{parent}"
-                at = f"{name}::{at}"
-                self.carriers[name] = outer, Joint(f"{at} (weld)", "fixed", parent, at, self._pose(base))
+                weld = replace(
+                    weld,
+                    name=f"{name}::{weld.name}",
+                    parent=parent,
+                    child=f"{name}::{at}",
+                )
+                self.carriers[name] = outer, weld
             else:
-                joints.append(Joint(f"{at} (weld)", "fixed", WORLD, at, self._pose(base)))
+                joints.append(weld)
             self.ties |= dict.fromkeys((name, other) for other in sorted(others))
         links = tuple(_moved_link(link, place[link.name]) for link in model.links)
         pose = place[model.links[0].name] @ model.pose
         model = replace(model, pose=pose, links=links, joints=tuple(joints), spans=tuple(self.spans[name]))
         if name not in self.carriers and not model.static and all(_holds(model, link.name) for link in links):
-            bare = tuple(replace(link, inertia=None) for link in links)
-            return replace(model, static=True, links=bare, joints=(), gravity=True)
+            return still(model)
         return model
 
     def all(self) -> tuple[Model, ...]:
@@ -298,9 +306,9 @@ class _Builder:
         """What of collision filter groups goes when all of some models are gone. Raises UserError."""
         groups: dict[str, Directive] = {}
         for one in self.filters:
-            name = one.source.scoped(one.source.text_of(one.keys["name"]))
+            name = one.source.name_of(one.keys["name"])
             if name in groups:
-                raise one.source.complain(one.node, f"the group '{name[:80]}' is added twice")
+                raise one.source.complain(one.node, f"the group '{name}' is added twice")
             groups[name] = one
         owners = {name: self._owners(one, "members", {}) for name, one in groups.items()}
         before: dict[str, frozenset[str]] = {}
@@ -321,16 +329,16 @@ class _Builder:
                     yield Shared(one.source.bytes_of(span), names)
 
     def _owners(self, one: Directive, key: str, groups: Mapping[str, frozenset[str]]) -> frozenset[str]:
-        nodes = one.source.items(one.keys[key]) if key in one.keys else []
+        nodes = one.source.items(one.keys.get(key))
         return frozenset[str]().union(*(self._owner(node, key, one.source, groups) for node in nodes))
 
     def _owner(self, node: Node, key: str, source: Source, groups: Mapping[str, frozenset[str]]) -> frozenset[str]:
         """The models of a member, which is a body, or of a group. Raises UserError."""
         if key == "members":
             return frozenset(map(self.carrier, self._frame(node, source).owners))
-        name = source.scoped(source.text_of(node))
+        name = source.name_of(node)
         if name not in groups:
-            raise source.complain(node, f"there is no group '{name[:80]}'{nearest(name[:80], list(groups)[:500])}")
+            raise source.complain(node, f"there is no group '{name}'{nearest(name, groups)}")
         return groups[name]
 
 
@@ -356,22 +364,18 @@ def parse_directives(text: bytes, path: Path, context: Context) -> World:
         shared.append(Shared(span, frozenset(model.name for model in models), b"\n  []"))
     context.note_unused(_element(WORLD, path))
     ties = ((builder.carrier(name), builder.carrier(other)) for name, other in builder.ties)
-    return World(
+    world = World(
         path=path,
         name=path.name.split(".")[0],
         text=text,
         gravity=GRAVITY,
         models=models,
         version=VERSION,
-        notes=tuple(context.notes),
         anchors=frozenset(map(builder.carrier, builder.anchors)),
-        resources=context.resources.taken,
-        found=tuple(context.resources.found.values()),
-        absent=context.resources.absent(),
-        guessed=tuple(context.guessed),
         ties=tuple(dict.fromkeys((name, other) for name, other in ties if name != other)),
         shared=tuple(shared),
     )
+    return context.recorded(world)
 
 
 def _element(tag: str, path: Path, line: int = 1, span: Span = (0, 0)) -> Element:
@@ -396,22 +400,22 @@ def _frames(scope: Scope, here: Pose, prefix: str) -> Iterator[tuple[str, Pose, 
 def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -> tuple[Model, dict[str, Pose]]:
     """`model` with joints at `positions` (rad, or m), and how far each link moves. Raises UserError."""
     joints = {joint.name: joint for joint in model.joints}
-    turns: dict[str, tuple[float, Pose]] = {}
+    at: dict[str, float] = {}
+    turns: dict[str, Pose] = {}
     for name, node in positions.items():
         joint = joints.get(name)
         if joint is None:
-            near = nearest(name[:80], list(joints)[:500])
-            raise source.complain(node, f"there is no joint '{name[:80]}'{near}")
+            raise source.complain(node, f"there is no joint '{name}'{nearest(name, joints)}")
         if joint.kind not in ("revolute", "continuous", "prismatic"):
-            raise source.complain(node, f"only joints with one position are read; {joint.kind} is '{name[:80]}'")
-        (at,) = source.numbers(node, 1)
-        x, y, z = joint.axis
+            why = f"only joints with one position are read; {joint.kind} is '{name}'"
+            raise source.complain(node, why)
+        (position,) = source.numbers(node, 1)
+        at[name] = position
         if joint.kind == "prismatic":
-            turns[joint.child] = at, Pose((x * at, y * at, z * at))
+            turns[joint.child] = Pose(vector(part * position for part in joint.axis))
         else:
-            sine, there = math.sin(at / 2), Pose(joint.pose.position)
-            turn = Pose((0.0, 0.0, 0.0), (math.cos(at / 2), x * sine, y * sine, z * sine))
-            turns[joint.child] = at, there @ turn @ there.inverse()
+            there = Pose(joint.pose.position)
+            turns[joint.child] = there @ turn(joint.axis, position) @ there.inverse()
     if not turns:
         return model, {}
     parents = {joint.child: joint.parent for joint in model.joints}
@@ -419,12 +423,13 @@ def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -
 
     def place(link: str) -> Pose:
         if link not in moved:
-            moved[link] = (place(parents[link]) if link in parents else HERE) @ turns.get(link, (0.0, HERE))[1]
+            base = place(parents[link]) if link in parents else HERE
+            moved[link] = base @ turns.get(link, HERE)
         return moved[link]
 
     links = tuple(_moved_link(link, place(link.name)) for link in model.links)
-    new = (_moved_joint(joint, place(joint.child), turns.get(joint.child, (0.0, HERE))[0]) for joint in model.joints)
-    return replace(model, links=links, joints=tuple(new)), moved
+    turned = (_moved_joint(one, place(one.child), at.get(one.name, 0.0)) for one in model.joints)
+    return replace(model, links=links, joints=tuple(turned)), moved
 
 
 def _moved_link(link: Link, by: Pose) -> Link:

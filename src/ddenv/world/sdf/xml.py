@@ -24,7 +24,7 @@ def parse(text: bytes, path: Path, root: str = "") -> Element:
         return parse_xml(text, path, root)
     except NotXml as error:
         where = f"{path}:{error.line}:{error.column}" if error.line else str(path)
-        raise UserError(f"{where}: {error}") from None
+        raise UserError(f"{where}: {error.why}") from None
 
 
 def tag_end(text: bytes, element: Element) -> int:
@@ -99,7 +99,7 @@ def numbers(element: Element, count: int) -> tuple[float, ...]:
     """The text of `element` as `count` finite numbers. Raises UserError."""
     values = floats(element)
     if len(values) != count or not all(map(math.isfinite, values)):
-        shown = " ".join((element.text or "").split())[:60]
+        shown = " ".join(text_of(element).split())[:60]
         wanted = "one finite number" if count == 1 else f"{count} finite numbers"
         raise complain(element, f"expected {wanted}, found '{shown}'")
     return values
@@ -123,7 +123,7 @@ def truth(parent: Element, tag: str, default: bool) -> bool:
     child = parent.find(tag)
     if child is None:
         return default
-    word = (child.text or "").strip().lower()
+    word = text_of(child).lower()
     if word not in ("1", "true", "0", "false"):
         raise complain(child, f"expected true or false, found '{word[:60]}'")
     return word in ("1", "true")
