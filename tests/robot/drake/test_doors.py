@@ -23,6 +23,7 @@ SIZE = 8.0  # of the house along x and y, m; it stands around the origin
 WALL = 0.15
 HIGH = 2.5
 FLOOR = static("floor", piece("floor", Box((20.0, 20.0, 0.1)), Pose((EDGE + 10.0, 0.0, -0.05))))
+STARTS = 12
 AHEAD = 2.0  # where a wall with a door stands, m ahead of the robot
 
 
@@ -84,9 +85,9 @@ def test_a_robot_passes_the_doors_that_are_wider_than_itself(drive, husky, more,
 
 
 def starts() -> Iterator[Pose]:
-    """Thirty, some straight ahead of the door, some of the wall."""
+    """Some straight ahead of the door, some of the wall."""
     random = np.random.default_rng(1)
-    for _ in range(30):
+    for _ in range(STARTS):
         yield Pose.from_rpy(0.0, random.uniform(-1.2, 1.2), 0.0, 0.0, 0.0, random.uniform(-0.3, 0.3))
 
 
@@ -105,4 +106,4 @@ def test_a_building_is_the_same_however_it_is_cut(drive, husky):
             apart.append(float(np.linalg.norm(np.subtract(other.end_pose[:3], one.end_pose[:3]))))
     # A robot that slides along a wall with spinning wheels may end some cm away if a wall moves by 0.1 micrometres.
     assert sorted(apart)[-5] < 1e-3 and max(apart) < 0.05
-    assert 2 < passed < 28
+    assert 0 < passed < STARTS
