@@ -125,9 +125,13 @@ def slowly(each: Footprint, view: View) -> tuple[np.ndarray, np.ndarray]:
                 beyond = turns - wider * np.hypot(*sides.T)
                 inside[row, column] |= bool((beyond <= 0).all())
                 unsure[row, column] |= bool((abs(beyond) < 1e-6).any())
-    x, y = view.pixels(np.array([each.center]))[0]
-    if (each.area < 4 * view.scale**2 or not each.polygons) and 0 <= x < view.columns and 0 <= y < 2 * view.rows:
-        inside[int(y), int(x)], unsure[int(y), int(x)] = True, False
+    # What is smaller than a pixel stays visible.
+    boxes = [(polygon.min(axis=0), polygon.max(axis=0)) for polygon in each.polygons]
+    small = [(low + high) / 2 for low, high in boxes if np.hypot(*(high - low)) <= SHORT * view.scale]
+    for middle in small if each.polygons else [each.center]:
+        x, y = view.pixels(np.array([middle]))[0]
+        if 0 <= x < view.columns and 0 <= y < 2 * view.rows:
+            inside[int(y), int(x)], unsure[int(y), int(x)] = True, False
     return inside, unsure
 
 

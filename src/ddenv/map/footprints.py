@@ -65,7 +65,8 @@ def footprints(world: World) -> tuple[Footprint, ...]:
     """Footprints of all models except the ground; those that cover most come first, so that small ones are drawn on top."""
     ground = ground_height(world)
     prints = [footprint(model, ground=ground) for model in world.models if not is_ground(model)]
-    return tuple(sorted(prints, key=lambda each: -each.covered))
+    # Equal models that are turned differ only by rounding: they stay in the file's order.
+    return tuple(sorted(prints, key=lambda each: -round(each.covered, 6)))
 
 
 def ground_height(world: World) -> float:

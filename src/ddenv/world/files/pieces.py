@@ -20,9 +20,11 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.world.access import Unusable
+from ddenv.world.files.boxes import volume
 from ddenv.world.files.kept_pieces import keep, kept_file, read_kept
 from ddenv.world.files.meshes import Surface, convex_hull, pack_pieces, surface_of
 from ddenv.world.files.triangles import Part
+from ddenv.world.model import Mesh
 from ddenv.world.pose import Vector
 
 # A piece that leaves at most this share of its hull empty is that hull.
@@ -84,7 +86,7 @@ def convex_pieces(vertices: Floats, faces: Integers, most: int) -> list[Surface]
             uneven.append(part.triangles)
     most_patches = min(MOST_PATCHES, most // 4)
     patches = _patches(uneven, most_patches)
-    little = min(LITTLE, LITTLE_SHARE * trimesh.Trimesh(*whole, process=False).volume)
+    little = min(LITTLE, LITTLE_SHARE * volume(Mesh("hull", *whole)))
     hulls = sorted(_cut(solids, most - len(patches), little), key=Manifold.volume, reverse=True)
     pieces = [_surface(hull) for hull in hulls]
     if len(pieces) + len(patches) > most:
@@ -115,7 +117,7 @@ def solid_of(part: trimesh.Trimesh) -> Manifold | None:
     # Of what is not closed Manifold only says so, or reads memory that it does not own.
     if not _is_closed(faces):
         return None
-    if trimesh.Trimesh(part.vertices, faces, process=False).volume < 0:
+    if volume(Mesh("part", part.vertices, faces)) < 0:
         faces = faces[:, ::-1]
     solid = Manifold(Mesh64(np.ascontiguousarray(part.vertices), np.ascontiguousarray(faces, dtype=np.uint64)))
     return solid if solid.volume() > SMALLEST else None

@@ -42,6 +42,7 @@ DEFAULT_SIZES: dict[str, dict[str, tuple[float, ...]]] = {
 # The maximum number of convex pieces of one mesh, and that of libsdformat for <convex_decomposition> without a number.
 MOST_PIECES = 512
 DEFAULT_HULLS = 16
+MOST_POINTS = 2_000  # of all outlines of a polyline; of a finer one the hull is taken
 ROUGH = "contact at the edges of those that are no boxes is rough"
 RANGE = f"sizes must be from {SMALLEST:g} to {LARGEST:g} m"
 
@@ -83,7 +84,7 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
         case "mesh":
             return _mesh(element, parent, context, scale)
         case "polyline":
-            return _polyline(geometry, scale)
+            return _polyline(geometry, context, scale)
         case "empty":
             return None
         case "heightmap" | "image" as tag:
@@ -296,7 +297,7 @@ def _sizes(shape: Element) -> list[Any]:
     return sizes
 
 
-def _polyline(geometry: Element, scale: Vector) -> Placed:
+def _polyline(geometry: Element, context: Context, scale: Vector) -> Placed:
     """All `<polyline>`s of a `<geometry>`, extruded upwards from z = 0; what lies in two of them is a hole. Raises UserError."""
     elements = geometry.findall("polyline")
     (height,) = _sizes(elements[0])
@@ -307,7 +308,11 @@ def _polyline(geometry: Element, scale: Vector) -> Placed:
     # Meshes of equal outlines compare equal.
     digest = hashlib.blake2b(repr([outline.tolist() for outline in outlines]).encode(), digest_size=8).hexdigest()
     origin = f"polyline {digest} {height!r}"
-    if len(elements) == 1 and abs(polygon_area(outlines[0])) >= 0.99 * polygon_area(corners):
+    is_convex = len(elements) == 1 and abs(polygon_area(outlines[0])) >= 0.99 * polygon_area(corners)
+    is_fine = sum(map(len, outlines)) > MOST_POINTS
+    if is_fine and not is_convex:
+        context.note("replaced", elements[0], f"a polyline of more than {MOST_POINTS} points by its convex hull")
+    if is_convex or is_fine:
         low = np.column_stack([corners, np.zeros(len(corners))])
         try:
             convex = Mesh(origin, *hull(np.vstack([low, low + np.array([0, 0, height])])))
