@@ -267,7 +267,7 @@ def note_unseen(world: World, among: Collection[str]) -> Iterator[tuple[str, str
 
 
 def _unlike(model: Model) -> str:
-    """In which way, of those in UNLIKE, what can be hit of a model is unlike what is seen of it; "" if it is not."""
+    """The key of UNLIKE that says how the collisions of a model differ from its visuals; "" if they do not."""
     hit = model_bounds(model)
     seen = around(shape_bounds(visual.shape, visual.pose) for visual in model.visuals)
     if seen is None:

@@ -64,8 +64,8 @@ def boxes(terrain: Terrain, place: Pose, region: Region | None, tolerance: float
         low, high = waiting.pop()
         middle = (low + high - cells) / 2 * step
         half = (high - low) / 2 * step
-        x, y, _ = (place @ Pose((*middle.tolist(), 0.0))).position
-        if region is not None and not region.reaches((x, y), float(np.linalg.norm(half))):
+        centre = place @ Pose((float(middle[0]), float(middle[1]), 0.0))
+        if region is not None and not region.reaches(centre.position[:2], float(np.linalg.norm(half))):
             continue
         finest = (high - low).max() <= FINEST
         found = _box(terrain, low, high, middle, half, np.inf if finest else tolerance)
@@ -77,9 +77,11 @@ def boxes(terrain: Terrain, place: Pose, region: Region | None, tolerance: float
         # Between two cells, where there are several.
         if high[axis] - low[axis] > 1:
             cut = np.floor(cut)
-        below, above = high.copy(), low.copy()
-        below[axis] = above[axis] = cut
-        waiting += [(low, below), (above, high)]
+        end_of_first = high.copy()
+        end_of_first[axis] = cut
+        start_of_second = low.copy()
+        start_of_second[axis] = cut
+        waiting += [(low, end_of_first), (start_of_second, high)]
 
 
 def _box(

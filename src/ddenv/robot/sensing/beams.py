@@ -252,7 +252,8 @@ class Relief:
         under: Booleans = above <= 0
         first = under.argmax(axis=0)
         beam = np.arange(way.shape[1])
-        before, after = above[first - 1, beam], above[first, beam]
+        before = above[first - 1, beam]
+        after = above[first, beam]
         enter = along[first] - along[1] * after / (after - before + NEVER)
         # A beam that begins below the surface does not meet it, nor does one that comes from below the terrain's edge.
         met = under.any(axis=0) & (before > 0)

@@ -114,7 +114,8 @@ class Template:
         self.names = names
         near = [model for model in self._solid.models if model.name in names - self._far]
         near = [self._grounds.get(model.name, model) for model in near]
-        world, scenario = replace(self._solid, models=tuple(near)), self._scenario
+        world = replace(self._solid, models=tuple(near))
+        scenario = self._scenario
         try:
             built = build(world, self._robot, self._drive, scenario.simulation, scenario.controller.motor_gain)
         except (ValueError, RuntimeError, SystemExit) as error:

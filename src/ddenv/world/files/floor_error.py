@@ -15,7 +15,7 @@ from ddenv.arrays import Floats
 from ddenv.text import first_of
 from ddenv.world.extent import vertices_of
 from ddenv.world.files.pieces import connected_parts, solid_of, union
-from ddenv.world.model import Collision, Mesh, Model, World
+from ddenv.world.model import Collision, Mesh, Model, Piece, World
 from ddenv.world.pose import Pose
 
 # Between these heights above z = 0 most robots touch what is there, m.
@@ -43,29 +43,32 @@ class FloorError:
 def floor_errors(models: Iterable[Model]) -> Iterator[FloorError]:
     """The errors of all meshes of `models` that are cut into pieces, and reach the heights of a robot."""
     for owner, link in ((model, link) for model in models for link in model.links):
-        cut = (one for one in link.collisions if one.piece is not None)
-        for (mesh, _), group in groupby(cut, key=lambda one: (one.piece and one.piece.mesh, one.name)):
-            pieces = list(group)
+        cut = ((one.piece, one) for one in link.collisions if one.piece is not None)
+        for (mesh, _), group in groupby(cut, key=lambda pair: (pair[0].mesh, pair[1].name)):
             # Of a finer mesh only the hull is known.
-            if mesh is not None and not mesh.simplified:
-                yield from _error(owner.name, mesh, pieces)
+            if mesh.simplified:
+                continue
+            error = _error(owner.name, list(group))
+            if error.floor > 0:
+                yield error
 
 
-def _error(model: str, mesh: Mesh, pieces: list[Collision]) -> Iterator[FloorError]:
-    first = pieces[0]
-    place = first.pose if first.piece is None else first.pose @ first.piece.pose.inverse()
-    truth = _of_mesh(mesh, place)
-    solids = (Manifold.hull_points(_placed(vertices_of(one.shape, 0)[0], one.pose)) for one in pieces)
+def _error(model: str, pieces: list[tuple[Piece, Collision]]) -> FloorError:
+    """The error of the mesh that is cut into `pieces`; its floor is 0 if it lies above or below a robot."""
+    piece, first = pieces[0]
+    truth = _of_mesh(piece.mesh, first.pose @ piece.pose.inverse())
+    solids = (Manifold.hull_points(_placed(vertices_of(one.shape, 0)[0], one.pose)) for _, one in pieces)
     taken = union(_at_height(solid) for solid in solids)
     floor = (truth + taken).hull().area()
-    if floor > 0:
-        yield FloorError(
-            model=model,
-            pieces=len(pieces),
-            floor=floor,
-            blocked=max((taken - truth).area(), 0.0) / floor,
-            free=max((truth - taken).area(), 0.0) / floor,
-        )
+    blocked = max((taken - truth).area(), 0.0)
+    free = max((truth - taken).area(), 0.0)
+    return FloorError(
+        model=model,
+        pieces=len(pieces),
+        floor=floor,
+        blocked=blocked / max(floor, 1e-12),
+        free=free / max(floor, 1e-12),
+    )
 
 
 def note_pieces(world: World, among: Collection[str]) -> Iterator[tuple[str, str]]:

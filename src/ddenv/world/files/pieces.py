@@ -1,9 +1,9 @@
 """Cuts a mesh into convex pieces, with the space between its parts: doors, the room below a table.
 
 Each connected part that encloses a solid is cut along planes of its own faces, where it is concave, until each piece fills its
-convex hull. So the walls of a building become boxes, exactly. Of a part that encloses nothing, each flat area becomes a thin
+convex hull. So walls at right angles become boxes, exactly. Of a part that encloses nothing, each flat area becomes a thin
 plate below it; a curved one with many triangles becomes the hulls of small patches. Manifold (github.com/elalish/manifold) does
-the geometry; it gives the same pieces on each machine.
+the geometry. A run stores its pieces, so that its bits depend on no other machine's.
 """
 
 from __future__ import annotations
@@ -198,7 +198,7 @@ def _cut(solids: Iterable[Manifold], most: int, little: float) -> list[Manifold]
                 done.append(hull)
 
     for solid in solids:
-        add(_simplified(solid))
+        add(solid if solid.num_tri() <= MOST_TRIANGLES else solid.simplify(SIMPLER))
     work = 0
     cuts = 0
     while waiting and work < MOST_WORK and cuts < most:
@@ -215,10 +215,6 @@ def _cut(solids: Iterable[Manifold], most: int, little: float) -> list[Manifold]
             add(half)
     hulls = (_rounded(hull) for hull in (*done, *(part.hull() for _, _, part in waiting)))
     return [hull for hull in hulls if not hull.is_empty()]
-
-
-def _simplified(solid: Manifold) -> Manifold:
-    return solid if solid.num_tri() <= MOST_TRIANGLES else solid.simplify(SIMPLER)
 
 
 def _halves(solid: Manifold, planes: list[Plane]) -> list[Manifold]:
@@ -239,32 +235,40 @@ def _halves(solid: Manifold, planes: list[Plane]) -> list[Manifold]:
 def _planes(solid: Manifold) -> list[Plane]:
     """Planes along which `solid` can be cut: those of faces that meet in a concave edge, the ones with the longest edges first."""
     vertices, faces = _triangles(solid)
-    normals = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
-    areas = np.linalg.norm(normals, axis=1)
-    normals /= np.maximum(areas, 1e-30)[:, None]
+    size = float(np.ptp(vertices, axis=0).max())
+    normals, points, lengths = _concave_edges(vertices, faces, CONCAVE * size)
+    heights = np.einsum("ij,ij->i", normals, points)
+    rounded = np.round(np.column_stack([normals, heights / size]), 4)
+    planes, first, same = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    total = np.bincount(same.reshape(-1), lengths, len(planes))
+    most = int(np.clip(CHECKED_TRIANGLES / len(faces), FEWEST_PLANES, MOST_PLANES))
+    longest = first[np.argsort(-total, kind="stable")[:most]]
+    # Just beyond the face: a cut in its own plane could leave what it parts joined by triangles without area.
+    return [(normals[edge], float(heights[edge] + BEYOND * size)) for edge in longest]
+
+
+def _concave_edges(vertices: Floats, faces: Integers, least: float) -> tuple[Floats, Floats, Floats]:
+    """The edges of a closed surface at which a face rises more than `least` (m) above the plane of its neighbour.
+
+    For each, and from either side: the neighbour's unit normal (N, 3), a point of the edge (N, 3) m, and its length (N,) m.
+    """
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
     starts = faces.T.reshape(-1)
     ends = np.roll(faces, -1, axis=1).T.reshape(-1)
-    beyond = np.roll(faces, -2, axis=1).T.reshape(-1)
+    opposite = np.roll(faces, -2, axis=1).T.reshape(-1)
     # Each edge of a face runs the other way along the neighbouring face.
-    way = starts * len(vertices) + ends
+    forth = starts * len(vertices) + ends
     back = ends * len(vertices) + starts
-    order = np.argsort(way)
-    other = order[np.searchsorted(way, back, sorter=order)]
-    face = np.tile(np.arange(len(faces)), 3)
-    size = float(np.ptp(vertices, axis=0).max())
-    rise = np.einsum("ij,ij->i", normals[face], vertices[beyond[other]] - vertices[starts])
-    concave = rise > CONCAVE * size
-    lengths = np.linalg.norm(vertices[ends] - vertices[starts], axis=1)[concave]
-    sides = normals[face[concave]]
-    heights = np.einsum("ij,ij->i", sides, vertices[starts[concave]])
-    planes, same = np.unique(np.round(np.column_stack([sides, heights / size]), 4), axis=0, return_inverse=True)
-    total = np.bincount(same.reshape(-1), lengths, len(planes))
-    first = np.zeros(len(planes), dtype=int)
-    first[same.reshape(-1)[::-1]] = np.arange(len(sides))[::-1]
-    most = int(np.clip(CHECKED_TRIANGLES / len(faces), FEWEST_PLANES, MOST_PLANES))
-    chosen = first[np.argsort(-total, kind="stable")[:most]]
-    # Just beyond the face: a cut in its own plane could leave what it parts joined by triangles without area.
-    return [(sides[number], float(heights[number] + BEYOND * size)) for number in chosen]
+    order = np.argsort(forth)
+    neighbour = order[np.searchsorted(forth, back, sorter=order)]
+    own = np.tile(normals, (3, 1))
+    rise = np.einsum("ij,ij->i", own, vertices[opposite[neighbour]] - vertices[starts])
+    concave = rise > least
+    points = vertices[starts[concave]]
+    lengths = np.linalg.norm(vertices[ends[concave]] - points, axis=1)
+    return own[concave], points, lengths
 
 
 def _rounded(hull: Manifold) -> Manifold:
