@@ -132,7 +132,8 @@ def _source(module: str) -> Path:
 
 
 # Words are compared by so many characters, and with so many known ones: more would take seconds.
-LONGEST_COMPARED, MOST_COMPARED = 80, 1000
+LONGEST_COMPARED = 80
+MOST_COMPARED = 1000
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

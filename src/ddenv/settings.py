@@ -15,7 +15,8 @@ from ddenv.text import Data, plain
 Value = int | float | str | bool | None
 
 # Models and robots are at most this far from the origin, m, and a heading makes at most so many radians.
-FARTHEST, TURNS = 1e6, 1e3
+FARTHEST = 1e6
+TURNS = 1e3
 
 # Kinds of elements that the user can have skipped instead of refusing the world.
 Ignorable = Literal["heightmap", "image", "mesh", "include", "joint", "population"]

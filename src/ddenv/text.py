@@ -48,7 +48,8 @@ def shortened(name: str, columns: int, head: int | None = None) -> str:
     name = printable(name)
     if width(name) <= columns:
         return name
-    first, last = "", ""
+    first = ""
+    last = ""
     while True:
         take_first = width(first) <= width(last) if head is None else width(first) < head
         char = name[len(first)] if take_first else name[-1 - len(last)]

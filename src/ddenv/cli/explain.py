@@ -35,7 +35,8 @@ def why_command(run: str, as_json: bool) -> int:
 
     with RunFile(find_run(run)) as file:
         state = fold(file.events())
-        passing, certificate = nearest(file, state), current(state)
+        passing = nearest(file, state)
+        certificate = current(state)
         found = () if passing is not None and certificate is None else reasons(file, state)
     if as_json:
         said = [asdict(each) | {"words": sentence(each)} for each in found]

@@ -43,7 +43,8 @@ def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool
         code = 0 if state.certified else 1
     except Interrupted as interrupted:
         # It may have ended just then.
-        state, code = interrupted.state, 0 if interrupted.state.certified else 130
+        state = interrupted.state
+        code = 0 if interrupted.state.certified else 130
     if as_json:
         print(json.dumps(summary(state, path)), flush=True)
     else:

@@ -42,7 +42,8 @@ def _offering(*, runs: bool = False, scenarios: bool = False) -> Complete:
     return complete
 
 
-runs, scenarios = _offering(runs=True), _offering(scenarios=True)
+runs = _offering(runs=True)
+scenarios = _offering(scenarios=True)
 runs_and_scenarios = _offering(runs=True, scenarios=True)
 run_argument = click.argument("run", shell_complete=runs)
 
@@ -54,7 +55,9 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in ever
     """Comma-separated numbers of a place, m and rad, with a minimum and a maximum number of them."""
 
     def __init__(self, name: str, fewest: int, most: int) -> None:
-        self.name, self.fewest, self.most = name, fewest, most
+        self.name = name
+        self.fewest = fewest
+        self.most = most
 
     def convert(self, value: Any, param: Any, ctx: Any) -> tuple[float, ...]:
         try:

@@ -16,7 +16,8 @@ from ddenv.runs.folder import find_run
 from ddenv.text import percent
 
 # How `git bisect run` reads exit codes.
-FAILS, PASSES = 1, 0
+FAILS = 1
+PASSES = 0
 
 
 @click.command("report")

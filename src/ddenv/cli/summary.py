@@ -100,7 +100,8 @@ def _whole_world(state: RunState) -> FreshRuns | None:
 
 
 def summary_lines(state: RunState, path: Path) -> list[str]:
-    before, after = len(state.elements), len(state.environment)
+    before = len(state.elements)
+    after = len(state.environment)
     if state.baseline is None:
         return [printable(f"run file: {path}")]
     found = current(state)
@@ -128,7 +129,8 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     if state.status == "finished" and found is not None:
         could_go = only_helping(found)
         out = f", and H in it leaves {could_go[0]} out" if could_go else ""
-        run, bundle = attach_name(path), shlex.quote(f"{path.stem}.zip")
+        run = attach_name(path)
+        bundle = shlex.quote(f"{path.stem}.zip")
         passing = "" if state.isolated is not None else f"'ddenv isolate {run}' finds a nearest world that passes, "
         said.append(
             f"next: 'ddenv open {run}' shows it{out}, 'ddenv why {run}' says why it fails, {passing}"

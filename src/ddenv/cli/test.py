@@ -56,7 +56,8 @@ def test_command(
     from ddenv.evidence.claims import current
     from ddenv.runs.export import with_margins
 
-    planned, margins = {name: given.pop(name) for name in PLANNED}, given.pop("margin")
+    planned = {name: given.pop(name) for name in PLANNED}
+    margins = given.pop("margin")
     names = None if keep is None else [name.strip() for name in keep.split(",") if name.strip()]
     results = []
     with ExitStack() as robots:
@@ -70,7 +71,8 @@ def test_command(
             if not as_json:
                 print(line(result), flush=True)
     rows = summary(results)
-    certificate, oracle = None if what.state is None else current(what.state), what.scenario.oracle
+    certificate = None if what.state is None else current(what.state)
+    oracle = what.scenario.oracle
     others = []
     # Without a certificate there is nothing to compare with.
     if planned["minimal"] and simulator is not None and certificate and oracle and certificate.claims[0].low:

@@ -30,11 +30,13 @@ if TYPE_CHECKING:
 
 # A line names so many models.
 MOST_NAMES = 5
-LONGEST_NAME, LONGEST_URI = 34, 80
+LONGEST_NAME = 34
+LONGEST_URI = 80
 HEADER = ("model", "kind", "links", "shapes", "size, m", "centre x, y, z, m", "yaw", "notes")
 TO_THE_RIGHT = ("links", "yaw")
 # The columns that are left out first where not all fit; the width where all do.
-SPARE, WIDEST = ("links", "shapes", "yaw"), 10_000
+SPARE = ("links", "shapes", "yaw")
+WIDEST = 10_000
 
 # A world, as it is read.
 world_argument = together(
@@ -86,7 +88,8 @@ def world_report(world: World) -> Data:
     from ddenv.world.placement import inside
     from ddenv.world.sdf.official import refused
 
-    removable, models = frozenset(world.elements()), []
+    removable = frozenset(world.elements())
+    models = []
     for model in world.models:
         box = model_bounds(model)
         links = [{"name": link.name, "pose": [*link.pose.position, *link.pose.quaternion]} for link in model.links]
@@ -240,7 +243,8 @@ def _table(world: World, notes: Mapping[str, Iterable[str]], columns: int | None
             ", ".join(notes.get(model.name, ())),
         )
         found.append(cells)
-    titles, console = list(HEADER), Console(width=columns or WIDEST, color_system=None)
+    titles = list(HEADER)
+    console = Console(width=columns or WIDEST, color_system=None)
     for spare in (*SPARE, ""):
         table = Table(box=None, pad_edge=False, header_style="")
         for title in titles:
@@ -328,7 +332,8 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
 
     path = find_run(name)
     with RunFile(path) as run:
-        world, state = read_parts(run)[1], fold(run.events())
+        world = read_parts(run)[1]
+        state = fold(run.events())
     if passes:
         gone = removed_in_passing(state, path)
         head = f"the nearest world that passes lacks {count(len(gone), 'model')} of {len(state.elements)}:"

@@ -19,12 +19,18 @@ from ddenv.world.model import World
 from ddenv.world.pose import Point
 
 # Columns for numbers and frame beside the picture, and lines above and below it: title, frame, frame, numbers.
-NUMBERS, AXIS, AROUND = 6, 8, 4
-LEAST_COLUMNS, LEAST_ROWS = 40, 12
-LONGEST_NAME, SHORTEST_NAME = 28, 14
+NUMBERS = 6
+AXIS = 8
+AROUND = 4
+LEAST_COLUMNS = 40
+LEAST_ROWS = 12
+LONGEST_NAME = 28
+SHORTEST_NAME = 14
 HEADER = (" ", "model", "centre x, y, m", "size, m")
 GAP = "  "
-START, GOAL, WHITE = 0x1F6FEB, 0x1A7F37, 0xFFFFFF
+START = 0x1F6FEB
+GOAL = 0x1A7F37
+WHITE = 0xFFFFFF
 
 Entry = tuple[str, str, str, str]
 # x, y m, and yaw rad.
@@ -47,11 +53,13 @@ def terminal_map(
     `spawn` is x, y (m) and yaw (rad), `goal` x, y (m), if they should be marked; all finite. Of the models `dim` there are only
     faint areas.
     """
-    columns, rows = max(columns, LEAST_COLUMNS), max(rows, LEAST_ROWS)
+    columns = max(columns, LEAST_COLUMNS)
+    rows = max(rows, LEAST_ROWS)
     models = plan(world)
     low, high = extent([each.outline for each in models], [point[:2] for point in (spawn, goal) if point is not None])
     margin = np.maximum(0.3, 0.03 * (high - low))
-    low, high = low - margin, high + margin
+    low = low - margin
+    high = high + margin
     entries = []
     for sign, each in sorted(zip(signs(models), models, strict=True), key=lambda each: -each[1].outline.area):
         if each.model.name in dim:
@@ -80,7 +88,8 @@ def _view(low: np.ndarray, high: np.ndarray, columns: int, rows: int) -> View:
     wide, tall = (high - low).tolist()
     scale = max(wide / columns, tall / (2 * rows), FINEST)
     x, y = ((low + high) / 2).tolist()
-    needs, need_rows = math.ceil(wide / scale - 1e-6), math.ceil(tall / (2 * scale) - 1e-6)
+    needs = math.ceil(wide / scale - 1e-6)
+    need_rows = math.ceil(tall / (2 * scale) - 1e-6)
     return View(x, y, scale, min(columns, max(2 * NUMBERS, needs)), min(rows, max(3, need_rows)))
 
 
@@ -115,8 +124,10 @@ def _cell(entry: Entry, widths: Sequence[int]) -> str:
 
 def _framed(canvas: Canvas, view: View, color: bool) -> Iterator[str]:
     """The lines of the picture with its frame and its axes; all are equally wide."""
-    wide, high = view.columns * view.scale / 2, view.rows * view.scale
-    x_step, y_step = tick_step(2 * wide, max(1, view.columns // 8)), tick_step(2 * high, max(1, view.rows // 4))
+    wide = view.columns * view.scale / 2
+    high = view.rows * view.scale
+    x_step = tick_step(2 * wide, max(1, view.columns // 8))
+    y_step = tick_step(2 * high, max(1, view.rows // 4))
     x_ticks = ticks(view.x - wide, view.x + wide, x_step)
     y_ticks = ticks(view.y - high, view.y + high, y_step)
     across = {cell[1]: tick_text(x, x_step) for x in x_ticks if (cell := view.cell(x, view.y))}

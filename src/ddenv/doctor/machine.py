@@ -24,7 +24,8 @@ from ddenv.text import count
 NEEDED = {"drake": "pydrake", "textual": "textual", "numpy": "numpy", "scipy": "scipy", "scikit-learn": "sklearn"}
 SMALLEST = (80, 24)
 # Less free space or memory than this is worth a line, bytes.
-LITTLE_SPACE, LITTLE_MEMORY = 500_000_000, 1_500_000_000
+LITTLE_SPACE = 500_000_000
+LITTLE_MEMORY = 1_500_000_000
 
 
 def installation() -> Iterator[Finding]:
@@ -58,14 +59,16 @@ def terminal() -> Iterator[Finding]:
 
 
 def machine() -> Iterator[Finding]:
-    cores, all_cores = processor.usable_cores(), os.cpu_count() or 1
+    cores = processor.usable_cores()
+    all_cores = os.cpu_count() or 1
     yield Finding("machine", "cores", f"{cores} of {all_cores} may be used; {processor.name()}")
     yield _memory()
     yield _space("temporary files", Path(tempfile.gettempdir()), "machine")
 
 
 def _memory() -> Finding:
-    usable, free = processor.usable_memory(), processor.free_memory()
+    usable = processor.usable_memory()
+    free = processor.free_memory()
     if not math.isfinite(usable + free):
         return Finding("machine", "memory", "unknown")
     says = f"{usable / 1e9:.1f} GB may be used, {free / 1e9:.1f} GB are free"
@@ -89,7 +92,8 @@ def _space(what: str, folder: Path, group: str) -> Finding:
         with tempfile.TemporaryFile(dir=folder) as file:
             file.write(b"ddenv")
     except OSError as error:
-        says, advice = f"{folder} cannot be written: {error.strerror}", "set another one in DDENV_HOME or TMPDIR"
+        says = f"{folder} cannot be written: {error.strerror}"
+        advice = "set another one in DDENV_HOME or TMPDIR"
         return Finding(group, what, says, "wrong", advice)
     if free < LITTLE_SPACE:
         return Finding(group, what, says, "note", "a run needs up to a few hundred MB")

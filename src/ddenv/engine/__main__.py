@@ -90,7 +90,8 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         return 0
     if options.anyway == "no":
         check_crash_loop(journal)
-    stood, before = journal.state.status, journal.state.reason
+    stood = journal.state.status
+    before = journal.state.reason
     try:
         _begin(journal, jobs if cluster == HERE else 0, options.accept_mode)
         control = Control(journal, terminated, after, disk, attended=options.attended == "yes")

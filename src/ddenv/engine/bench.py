@@ -116,7 +116,8 @@ class Bench:
         # The budget is that of the reduction, which is over.
         if not implied and ((wanted.why != ISOLATE and self._is_spent()) or not self._control.has_disk_space()):
             return None
-        environment, state = journal.number(wanted.environment), journal.state
+        environment = journal.number(wanted.environment)
+        state = journal.state
         # All candidates meet the same noise.
         reduction = asked_of(state)
         number = len(state.tests) + 1
@@ -156,7 +157,8 @@ class Bench:
 
         Raises UserError if the bits differ, unless the run goes on `mixed`; and Stopped.
         """
-        state, run = self._journal.state, self._journal.file.path
+        state = self._journal.state
+        run = self._journal.file.path
         sound = (test for test in state.tests if test.phase == "baseline" and test.is_finished)
         test = next((test for test in sound if not test.broke), None)
         if state.physics.now == state.physics.proven or test is None:
@@ -250,7 +252,8 @@ class Bench:
 
     def _look_around(self, wait: float) -> None:
         self._control.poll()
-        taken, self._taken = self._taken, []
+        taken = self._taken
+        self._taken = []
         finished = sorted([*taken, *self._pool.finished(0.0 if taken else wait)], key=lambda one: one[0])
         for test, result in finished:
             self._record(test, result)

@@ -147,7 +147,8 @@ class Control:
             raise Stopped("the engine was terminated")
         # What is reckoned from the time that the run took would be wrong after a jump of the clock.
         offset = clock_offset()
-        jump, self._offset = offset - self._offset, offset
+        jump = offset - self._offset
+        self._offset = offset
         if abs(jump) > SMALL:
             self._journal.record(events.ClockJumped(jump))
         for command in self._journal.file.commands(self._journal.state.last_command):
@@ -251,13 +252,16 @@ class Control:
                 self._journal.record(_EVENTS[type(command)](self._journal, command))
 
     def _run(self, credit: int | None, pause_after_round: bool) -> None:
-        self._credit, self._pause_after_round = credit, pause_after_round
+        self._credit = credit
+        self._pause_after_round = pause_after_round
         if self._paused:
             self._paused = False
             self._journal.record(events.Resumed())
 
     def _pause(self) -> None:
-        self._paused, self._credit, self._pause_after_round = True, None, False
+        self._paused = True
+        self._credit = None
+        self._pause_after_round = False
         self._journal.record(events.Paused())
 
     def _go(self, node: int, rejected: int | None) -> None:
@@ -269,7 +273,8 @@ class Control:
 
 def _judged(journal: Journal, failures: Numbers) -> events.Outcomes:
     """The outcomes of all tests if the ends of `failures` count as f."""
-    file, state = journal.file, journal.state
+    file = journal.file
+    state = journal.state
     return rejudged(file, state, tuple(failure_of(file, state, test) for test in failures))
 
 

@@ -57,7 +57,8 @@ OTHER_WAY = (
 NOT_EXACT = "runs do not repeat, so nothing exact can be said of them; keep the rate of f instead: --accept-rate kept"
 NO_MODEL = "fails without any model: look at the ground, the robot, its controller, or something that is missing"
 # Of a rarer f no few replays say whether it still shows.
-FEWEST_REPLAYS, MOST_REPLAYS = 3, 60
+FEWEST_REPLAYS = 3
+MOST_REPLAYS = 60
 # To reduce a single run exactly takes so many of the whole world if they are alike: one shows f, the other that it repeats.
 ENOUGH_ALIKE = 2
 LEFT_OVER = "does the simulator keep something between its runs, such as a cache or a count?"
@@ -68,9 +69,12 @@ class Driver:
     """One engine's work on one run. All decisions follow from the journal, so a resumed run continues in the same way."""
 
     def __init__(self, scenario: Scenario, world: World, journal: Journal, bench: Bench, control: Control) -> None:
-        self._scenario, self._world = scenario, world
+        self._scenario = scenario
+        self._world = world
         self._reduction = scenario.reduction
-        self._journal, self._bench, self._control = journal, bench, control
+        self._journal = journal
+        self._bench = bench
+        self._control = control
         self._sight = Sight(world, journal.state.elements, self._reduction.delta, self._reduction.seed)
         # What the schemas know: the tests behind the verdicts of rounds that are over, each once.
         self._trials: dict[int, Trial] = {}
@@ -86,17 +90,21 @@ class Driver:
         # The share of the rate up to which the last certificate goes on, with all its runs.
         self._certify_rate: float | None = None
         # What the procedure asks of what is known.
-        self.shown, self.rate = journal.shown, journal.rate_of_whole
-        self.refused, self.refused_by_user = journal.is_refused, journal.is_refused_by_user
+        self.shown = journal.shown
+        self.rate = journal.rate_of_whole
+        self.refused = journal.is_refused
+        self.refused_by_user = journal.is_refused_by_user
 
     def reduce(self) -> None:
         """The whole run. Raises Stopped, and UserError when it cannot go on."""
-        journal, reduction = self._journal, self._reduction
+        journal = self._journal
+        reduction = self._reduction
         # Unknown names are refused before a robot runs.
         self.algorithm(steps.Leg(1, NOTHING, (NOTHING,), NOTHING, {}, Acceptance(1)))
         self._settle()
         leg = None if journal.state.baseline is None else self._first_leg()
-        whole, keeps_rate = journal.state.environments[0], reduction.accept_rate == "kept"
+        whole = journal.state.environments[0]
+        keeps_rate = reduction.accept_rate == "kept"
         alike = ENOUGH_ALIKE if settings(journal.state).reduces_one_run else None
         procedure = steps.procedure(self, whole, reduction.baseline_runs, keeps_rate, leg, enough_alike=alike)
         if self._carry_out(procedure) is None:
@@ -106,7 +114,9 @@ class Driver:
 
     def _settle(self) -> None:
         """Finds which models support others, once. Raises UserError if stacks are to be kept together and it cannot be found."""
-        scenario, journal, needed = self._scenario, self._journal, self._reduction.keep_supports
+        scenario = self._scenario
+        journal = self._journal
+        needed = self._reduction.keep_supports
         moves = any(model.links and not model.static for model in self._world.models)
         # A simulator in Python names the models that affected a run, and those that they rest on.
         in_python = scenario.oracle is not None and scenario.oracle.use is not None
@@ -136,7 +146,8 @@ class Driver:
         """
         self._certify_rate = certify_rate
         # A search that is due would begin at the end.
-        leg, self._only_certify = self._next_leg(), at_least
+        leg = self._next_leg()
+        self._only_certify = at_least
         chain = tuple(self._journal.state.environments[node.id] for node in self._journal.state.path)
         try:
             self._carry_out(steps.certify(self, leg, chain))
@@ -186,7 +197,9 @@ class Driver:
         assert leg is not None
         self._reduction = Reduction.model_validate(leg.settings)
         # It may leave out whole stacks, and none with a model that is pinned.
-        state, asked, exact = journal.state, self._reduction, exact_runs(journal.state)
+        state = journal.state
+        asked = self._reduction
+        exact = exact_runs(journal.state)
         together = Stacks.of(map(journal.models, stacks_of(state, state.nodes[leg.node].environment)))
         stays = journal.models(leg.pinned)
         stays |= together.of_any(stays)
@@ -204,14 +217,16 @@ class Driver:
             n_partitions=leg.n_partitions,
             again=leg.again,
         )
-        self._trials, self._unknown = {}, set()
+        self._trials = {}
+        self._unknown = set()
         self._learn(leg.tests, leg.evidence_test)
         return self._leg
 
     def _check_repeats(self) -> None:
         """Raises UserError if the first search that reduces chosen runs exactly begins, and one of them does not repeat."""
         journal = self._journal
-        exact, last = exact_runs(journal.state), journal.state.leg
+        exact = exact_runs(journal.state)
+        last = journal.state.leg
         if not exact or (last is not None and last.settings["accept_rate"] == "exact"):
             return
         if stands_for_all(journal.state):
@@ -279,7 +294,8 @@ class Driver:
     # What the procedure finds.
 
     def baseline_ran(self, runs: int, chose: int) -> steps.Baseline | None:
-        journal, whole = self._journal, self._journal.state.environments[0]
+        journal = self._journal
+        whole = self._journal.state.environments[0]
         tests = [journal.state.test(test) for test in journal.tests(whole, range(runs))]
         trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
         asked = self._reduction
@@ -316,7 +332,8 @@ class Driver:
         return self._first_leg()
 
     def round_began(self, number: int, round: Round) -> steps.Past | None:
-        state, leg = self._journal.state, self._journal.state.leg
+        state = self._journal.state
+        leg = self._journal.state.leg
         parts = tuple(map(Environment.of, round.partitions))
         assert leg is not None
         if leg.first_round + len(leg.past) > number:
@@ -335,7 +352,8 @@ class Driver:
         return None
 
     def _announce(self, number: int, round: Round) -> None:
-        journal, leg = self._journal, self._leg
+        journal = self._journal
+        leg = self._leg
         # These schemas score by distance in m, which is useful to show.
         shown = self._reduction.algorithm == "ddenv" and self._reduction.pair.endswith("-proximal")
         scores = [float(f"{score:.3f}") if shown else None for score in round.scores]
@@ -360,7 +378,8 @@ class Driver:
 
     def judged(self, index: int, environment: Environment, verdict: str, runs: int) -> None:
         """Records a verdict, unless an earlier engine has."""
-        journal, round = self._journal, self._journal.current
+        journal = self._journal
+        round = self._journal.current
         if verdict == "unknown":
             self._unknown.add(environment)
         if round.candidates[index].verdict:
@@ -433,9 +452,11 @@ class Driver:
 
     def certificate_due(self) -> steps.Certificate:
         """The certificate that this search has already, or a new one; a finished one only if no other is asked for."""
-        journal, last = self._journal, self._journal.state.certificate
+        journal = self._journal
+        last = self._journal.state.certificate
         if last is None or (self._only_certify is not None and last.claims):
-            asked, number = self._reduction, len(journal.state.certificates) + 1
+            asked = self._reduction
+            number = len(journal.state.certificates) + 1
             # What the bets have won so far holds for any share, so that the same ones can go on.
             before = last if last is not None and self._certify_rate is not None and not last.seeds else None
             # Where chosen runs were reduced, a rate is shown if the user asks for one.
@@ -445,7 +466,8 @@ class Driver:
             beside = RUNS_BESIDE_ALIKE if stands_for_all(journal.state) else RUNS_BESIDE
             at_least = max(self._only_certify or 0, beside) if seeds else self._only_certify or asked.baseline_runs
             first, error = (before.first_run, before.error) if before else (journal.fresh_run, error_of(number))
-            rate, share = journal.rate_of_whole(), self._certify_rate or asked.certify_rate
+            rate = journal.rate_of_whole()
+            share = self._certify_rate or asked.certify_rate
             note_price(journal, share, at_least)
             started = events.CertificateStarted(number, first, rate, asked.keep_rate, error, at_least, share, seeds)
             journal.record(started)
@@ -455,7 +477,8 @@ class Driver:
 
     def certified(self, made: steps.Certified) -> None:
         if not self._certificate.claims:
-            first, journal = made.certificate.first_run, self._journal
+            first = made.certificate.first_run
+            journal = self._journal
             chosen = [test for one in made.claims for test in journal.tests(one.environment, made.certificate.exact)]
             exactly = not chosen or self._all_repeat(chosen)
             claims = tuple(self._claim_made(claim, first, exactly) for claim in made.claims)
@@ -512,11 +535,14 @@ class Driver:
         return self._journal.state.certificate
 
     def _claim_made(self, named: steps.NamedClaim, first: int, exactly: bool) -> events.ClaimMade:
-        journal, runs = self._journal, named.exact or [first + run for run in named.runs]
+        journal = self._journal
+        runs = named.exact or [first + run for run in named.runs]
         tests = journal.tests(named.environment, runs, full=not named.exact)
         outcomes = Counter(journal.state.test(test).outcome for test in tests)
-        shown, sound = outcomes["similar"], outcomes.total() - sum(outcomes[outcome] for outcome in BROKEN)
-        number, claim = journal.number(named.environment), named.claim
+        shown = outcomes["similar"]
+        sound = outcomes.total() - sum(outcomes[outcome] for outcome in BROKEN)
+        number = journal.number(named.environment)
+        claim = named.claim
         share = shown / max(1, sound)
         interval = (share, share) if named.exact else anytime_interval(shown, sound)
         verdict = "not shown" if named.exact and not exactly else claim.verdict
@@ -525,12 +551,14 @@ class Driver:
     def stepped_back(self, place: int, again: tuple[Partition, ...], tests: tuple[NumberedRun, ...]) -> NoReturn:
         journal = self._journal
         nodes = self._nodes(journal.state.node)
-        node, lost = nodes[place].number, nodes[place + 1].number
+        node = nodes[place].number
+        lost = nodes[place + 1].number
         journal.record(events.RateLost(node, lost, again, journal.full_tests(tests)))
         self._bench.wait_for_search()
 
     def left_out(self, model: int, environment: Environment) -> NoReturn:
-        journal, first = self._journal, self._certificate.first_run
+        journal = self._journal
+        first = self._certificate.first_run
         runs = range(first, journal.fresh_run)
         evidence = journal.evidence_of(journal.tests(environment, runs, full=True))
         journal.record(events.LeftOut(model, journal.number(environment), evidence))

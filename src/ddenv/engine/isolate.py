@@ -56,7 +56,8 @@ def _open(journal: Journal) -> Isolation:
 
 
 def _begin(world: World, journal: Journal, at_least: int | None, before: str) -> None:
-    state, reduction = journal.state, Reduction.model_validate(journal.state.scenario["reduction"])
+    state = journal.state
+    reduction = Reduction.model_validate(journal.state.scenario["reduction"])
     baseline = [test for test in state.tests if test.phase == "baseline" and test.is_finished]
     sound = [test for test in baseline if not test.broke]
     rule = Passing.of(sum(test.outcome == "pass" for test in sound), len(sound))
@@ -67,16 +68,16 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
         journal, known_failure(state).failure_test
     )
     distance = distances_to_failure(state.elements, evidence).tolist()
-    stacks, left = _free(journal).by_first, journal.environment
+    stacks = _free(journal).by_first
+    left = journal.environment
     gone = {first: left.isdisjoint(stack) for first, stack in stacks.items()}
     suspects = sorted(stacks, key=lambda first: (gone[first], min(distance[model] for model in stacks[first])))
     chosen = exact_runs(state) if journal.whole == state.environments[0] else ()
-    number, first = (
-        len(state.isolations) + 1,
-        FIRST_RUN if last is None else last.asked.run + MOST_CHECKS * last.asked.block,
-    )
+    number = len(state.isolations) + 1
+    first = FIRST_RUN if last is None else last.asked.run + MOST_CHECKS * last.asked.block
     terms = rule.wanted, rule.rather_than, reduction.keep_rate, ERROR, least
-    size, block = sum(not gone[one] for one in suspects), max(FRESH_RUNS, 2 * least)
+    size = sum(not gone[one] for one in suspects)
+    block = max(FRESH_RUNS, 2 * least)
     journal.record(events.IsolationStarted(number, first, block, *terms, tuple(suspects), size, before, chosen))
 
 
@@ -90,7 +91,8 @@ class _Isolator:
     """Drives an isolation. All of it follows from the journal, so a resumed one comes to the same end."""
 
     def __init__(self, journal: Journal, bench: Bench) -> None:
-        self._journal, self._bench = journal, bench
+        self._journal = journal
+        self._bench = bench
         self._whole = journal.state.environments[0]
         now = _open(journal).asked
         rule = Each(now.chosen) if now.chosen else Passing(now.wanted, now.rather_than)
@@ -127,7 +129,8 @@ class _Isolator:
 
     def judged(self, index: int, environment: Environment, verdict: str, runs: int) -> None:
         _open(self._journal)
-        journal, number = self._journal, self._journal.number(environment)
+        journal = self._journal
+        number = self._journal.number(environment)
         verdict = VERDICTS[verdict]
         known = (removal.verdict for removal in journal.state.removals if removal.environment == number)
         if next(known, "") != verdict:
@@ -135,13 +138,15 @@ class _Isolator:
             journal.record(events.RemovalJudged(number, verdict, tests))
 
     def checked(self, check: Checked) -> None:
-        journal, now = self._journal, _open(self._journal)
+        journal = self._journal
+        now = _open(self._journal)
         first = now.asked.run + len(now.checks) * now.asked.block
         rests_on = journal.full_tests((test for one in check.claims for test in one.claim.rests_on), first)
         claims = []
         for one in check.claims:
             shown = [self.shown(one.environment, run) for run in one.exact or [first + run for run in one.runs]]
-            runs, reached = sum(type(each) is bool for each in shown), shown.count(True)
+            runs = sum(type(each) is bool for each in shown)
+            reached = shown.count(True)
             interval = (reached / max(1, runs),) * 2 if one.exact else anytime_interval(reached, runs)
             # With the model put back the goal is reached more rarely, but it is not shown to be missed.
             verdict = "not shown" if one.claim.verdict in HELPING else one.claim.verdict
@@ -151,7 +156,8 @@ class _Isolator:
 
     def _known_checks(self) -> list[Checked]:
         """What fresh runs have shown before this engine."""
-        journal, checks = self._journal, list[Checked]()
+        journal = self._journal
+        checks = list[Checked]()
         for check in _open(journal).checks:
             passing = journal.state.environments[journal.state.removals[check.removal - 1].environment]
             claims = []

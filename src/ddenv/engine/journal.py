@@ -113,7 +113,8 @@ class Journal:
         """The number of an environment. An event names it the first time."""
         known = self._numbers.get(environment)
         if known is None:
-            known, command = len(self.state.environments), self.command
+            known = len(self.state.environments)
+            command = self.command
             # A command is not obeyed by that.
             self.command = None
             self.record(EnvironmentNamed(known, environment))
@@ -199,7 +200,8 @@ class Journal:
 
     def rate_of_whole(self) -> float:
         """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
-        whole, state = self._numbers[self.whole], self.state
+        whole = self._numbers[self.whole]
+        state = self.state
         # In the runs that chose f it was lucky.
         lucky = {("baseline", run) for run in range(0 if state.baseline is None else state.baseline.chose)}
         tests = [

@@ -50,10 +50,12 @@ def result_data(result: Result, failures: Sequence[Failure] = ()) -> Data:
             "first_touched": {},
             "cut": False,
         }
-    outcome, distance = result.outcome, None
+    outcome = result.outcome
+    distance = None
     if failures:
         judgement = nearest([judge(result, failure) for failure in failures])
-        outcome, distance = judgement.outcome, judgement.distance
+        outcome = judgement.outcome
+        distance = judgement.distance
     pose = tuple(float(value) for value in result.end_pose)
     more: Data = {"taken": result.taken} if result.taken else {}
     if result.took_part is not None:
@@ -117,7 +119,8 @@ def failures_of(file: RunFile, state: RunState) -> tuple[Failure, ...]:
 
 def failure_of(file: RunFile, state: RunState, test: int) -> Failure:
     """The failure that a test showed. Raises UserError for a damaged run file."""
-    f, spec = known_failure(state), spec_of(state)
+    f = known_failure(state)
+    spec = spec_of(state)
     end = f.position if test == f.failure_test else end_of(state.test(test))
     return Failure(end, rows_of(file, test), spec.epsilon, spec.similarity)
 
@@ -211,7 +214,8 @@ def fix_failure(
     broken = sum(test.broke and test.run >= chose for test in tests)
     interval = anytime_interval if len(tests) > usual else wilson_interval
     shows = len(sound), similar, rate, *interval(similar, len(sound)), failing[f].id, failures[f].position
-    chance, needed = miss_chance(rate, iterations), iterations_needed(rate)
+    chance = miss_chance(rate, iterations)
+    needed = iterations_needed(rate)
     return BaselineFinished(*shows, chance, needed, _outcomes(judged), broken, seen=tuple(seen), chose=chose)
 
 

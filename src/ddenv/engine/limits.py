@@ -30,7 +30,8 @@ GIGABYTE = 1e9
 # So many runs of the whole world may be too late before one has ended.
 MOST_LATE = 3
 # So many engines may die in a row, each before it has got anywhere: before it wrote anything but these, among the last events.
-MOST_DEATHS, LAST = 3, 3000
+MOST_DEATHS = 3
+LAST = 3000
 NOWHERE = {"accept_mode_changed", "comparing", "supports_started", "leg_started", "environment_named"}
 NOWHERE |= {"test_started", "test_lost"}
 HELPS = "try fewer models that can move, a shorter --timeout, another simulation.time_step in the scenario"
@@ -60,13 +61,16 @@ def memory_limit(scenario: Scenario, jobs: int) -> float:
 
 def check_crash_loop(journal: Journal) -> None:
     """Raises UserError if the last engines all died before they got anywhere."""
-    path, last = journal.file.path, journal.state.revision
-    deaths, place = 0, 0
+    path = journal.file.path
+    last = journal.state.revision
+    deaths = 0
+    place = 0
     for event in journal.file.events(max(0, last - LAST)):
         if isinstance(event.event, events.EngineStarted):
             deaths += 1
         elif event.kind not in NOWHERE:
-            deaths, place = 0, event.id
+            deaths = 0
+            place = event.id
     if deaths >= MOST_DEATHS:
         raise UserError(
             f"{path}: the last {deaths} engines died after event {place}, before a test ended; {log_of(path)} may say why; "

@@ -38,7 +38,8 @@ Wanted = tuple[str, float, int]
 
 def numbers_left(parts: Parts, state: RunState, globs: Sequence[str]) -> list[Number]:
     """The numbers of what is left whose names match, those that promise most first. Raises UserError."""
-    f, world = state.f_position or (0.0, 0.0, 0.0), parts[1]
+    f = state.f_position or (0.0, 0.0, 0.0)
+    world = parts[1]
     kept = sorted(state.environment, key=lambda name: math.dist(center(world.model(name)), f))
     return chosen(numbers_of(*parts, kept), globs)
 
@@ -70,7 +71,8 @@ def find_margins(
     """
     now = journal.state.margining
     if asked is not None:
-        numbers, budget = numbers_left(parts, journal.state, asked[0]), asked[1]
+        numbers = numbers_left(parts, journal.state, asked[0])
+        budget = asked[1]
         if now is None or (now.wanted, now.asked.budget) != (tuple(one.name for one in numbers), budget):
             _begin(journal, numbers, budget, stood if now is None else (now.asked.status, now.asked.before))
     _Search(parts, journal, pool, control).carry_out()
@@ -84,24 +86,30 @@ def find_margins(
 
 
 def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tuple[str, str]) -> None:
-    certificate, rate = current(journal.state), journal.rate_of_whole()
+    certificate = current(journal.state)
+    rate = journal.rate_of_whole()
     if certificate is not None:
         rate = estimated_rate(certificate.claims[0].shown, certificate.claims[0].runs)
     asked = tuple(events.NumberAsked(**asdict(one)) for one in numbers)
     # Two numbers may be changed together at the end.
     error = known.error_each(rate, min(budget, known.MOST_OF_NUMBER * (len(numbers) + (len(numbers) > 1))))
-    status, environment = "stopped" if stood[0] == "stopped" else "finished", journal.number(journal.environment)
+    status = "stopped" if stood[0] == "stopped" else "finished"
+    environment = journal.number(journal.environment)
     certified = certificate is not None
     journal.record(events.MarginsStarted(asked, environment, rate, error, budget, certified, status, stood[1]))
 
 
 class _Search:
     def __init__(self, parts: Parts, journal: Journal, pool: Workers, control: Control) -> None:
-        self._parts, self._journal, self._pool, self._control = parts, journal, pool, control
+        self._parts = parts
+        self._journal = journal
+        self._pool = pool
+        self._control = control
         self._failures = failures_of(journal.file, journal.state)
         self._running: dict[int, Wanted] = {}
         self._kept = frozenset(journal.state.environments[self._now.asked.environment].names(journal.state.elements))
-        self._submitted, self._broken = len(journal.state.tests), 0
+        self._submitted = len(journal.state.tests)
+        self._broken = 0
         left = beside(journal.state)
         self._beside = None if left is None else left.run
         # How many looks at a number are over: the second one has the runs that are left.
@@ -157,7 +165,8 @@ class _Search:
             if values:
                 yield from ((name, value, run) for value, run in values if (value, run) not in made)
                 return
-            self._looks, self._possible = self._looks + 1, set()
+            self._looks = self._looks + 1
+            self._possible = set()
         runs = range(known.FIRST_FIX_RUN, known.FIRST_FIX_RUN + known.FIX_RUNS)
         for fix in known.fixes_of(self._now)[: known.MOST_FIXES]:
             if fix.confirmed is None:
@@ -182,7 +191,8 @@ class _Search:
         name, value, run = one
         self._submitted += 1
         self._running[self._submitted] = one
-        seed, limit = seed_of(self._parts[0].reduction, run), wall_limit(self._journal.state)
+        seed = seed_of(self._parts[0].reduction, run)
+        limit = wall_limit(self._journal.state)
         # Fresh runs are full ones, as those of a certificate.
         ends = None if run >= known.FIRST_FIX_RUN or not self._journal.stops_early else ends_of(self._failures)
         test = Run(self._kept, seed, ends, limit, self._changes(name, value))
@@ -190,7 +200,8 @@ class _Search:
         self._control.started()
 
     def _record(self, one: Wanted, result: Result) -> None:
-        data, seed = result_data(result, self._failures), seed_of(self._parts[0].reduction, one[2])
+        data = result_data(result, self._failures)
+        seed = seed_of(self._parts[0].reduction, one[2])
         kept = {name: data[name] for name in ("outcome", "failure", "distance", "end_pose", "wall_seconds")}
         # Of each value, the run that can be played beside one of what is left.
         motions = motions_of(result) if one[2] == self._beside else None

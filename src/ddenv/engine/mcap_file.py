@@ -36,8 +36,12 @@ Color = tuple[float, float, float, float]
 # Topic, kind, time (s), message. Topics without a slash in front get the run's name.
 Row = tuple[str, str, float, Message]
 # All runs are in one frame, and all transforms on one topic, as tools expect; other frames begin with the run's name.
-MAP, TRANSFORMS, RESULT = "map", "/tf", "/result"
-ROBOT_COLOR, LEFT_COLOR, ALWAYS_COLOR = (0.95, 0.75, 0.1, 1.0), (0.85, 0.45, 0.15, 1.0), (0.6, 0.6, 0.6, 1.0)
+MAP = "map"
+TRANSFORMS = "/tf"
+RESULT = "/result"
+ROBOT_COLOR = (0.95, 0.75, 0.1, 1.0)
+LEFT_COLOR = (0.85, 0.45, 0.15, 1.0)
+ALWAYS_COLOR = (0.6, 0.6, 0.6, 1.0)
 # The kinds of messages.
 TF = "tf2_msgs/msg/TFMessage"
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -50,7 +54,10 @@ WORDS = "std_msgs/msg/String"
 MARKERS = "visualization_msgs/msg/MarkerArray"
 KINDS = (TF, ODOMETRY, SCAN, IMU, WHEELS, TWIST, PLACE, WORDS, MARKERS)
 # Kinds of markers.
-CUBE, SPHERE, CYLINDER, TRIANGLES = 1, 2, 3, 11
+CUBE = 1
+SPHERE = 2
+CYLINDER = 3
+TRIANGLES = 11
 
 # The fields of messages and of their parts.
 _FIELDS = {
@@ -110,7 +117,8 @@ class Streams:
     heard: list[tuple[Reading, Twist | WheelSpeeds]] = field(default_factory=list)
 
     def begin(self, setup: Setup) -> None:
-        self.setup, self.heard = setup, []
+        self.setup = setup
+        self.heard = []
 
     def hear(self, reading: Reading, command: Twist | WheelSpeeds) -> None:
         self.heard.append((reading, command))
@@ -132,12 +140,14 @@ def write_mcap(run: Path, target: Path) -> list[str]:
     if not chosen:
         raise UserError(f"{run}: f is not known yet, so there is no run to write; run it first: ddenv resume {run}")
     template = Variants(subject.world, subject.robot, subject.scenario)
-    said, output = [], BytesIO()
+    said = []
+    output = BytesIO()
     writer = Writer(output)
     schemas = {kind: writer.register_msgdef(kind, definition(kind)) for kind in KINDS}
     writer.write_message(RESULT, schemas[WORDS], {"data": shown(state)}, nanoseconds(0.0))
     for name, test, rows in chosen:
-        streams, models = Streams(), frozenset(state.models_of(test))
+        streams = Streams()
+        models = frozenset(state.models_of(test))
         result = template.run(models, test.seed, listener=streams)
         # A test that ended early is written to its end.
         if not np.array_equal(result.trajectory[: len(rows)], rows):
@@ -173,7 +183,9 @@ def _chosen(file: RunFile, state: RunState) -> Iterator[tuple[str, int]]:
 
 def messages(run: str, models: frozenset[str], result: RunResult, streams: Streams, subject: Subject) -> Iterator[Row]:
     """What is still, what moved, and what the robot sensed and did in a run of these models."""
-    goal, removable, base = subject.scenario.goal, frozenset(subject.elements), f"{run}/base_link"
+    goal = subject.scenario.goal
+    removable = frozenset(subject.elements)
+    base = f"{run}/base_link"
     yield "goal", PLACE, 0.0, {"header": header(0.0, MAP), "pose": pose(Pose((goal.x, goal.y, 0.0)))}
     drawn = []
     for model in subject.world.models:
@@ -203,7 +215,8 @@ def messages(run: str, models: frozenset[str], result: RunResult, streams: Strea
 
 def _sensed(reading: Reading, joints: Sequence[str], base: str, lidar: scenario.Lidar | None) -> Iterator[Row]:
     at = reading.time
-    guess, covariance = reading.estimate, [0.0] * 36
+    guess = reading.estimate
+    covariance = [0.0] * 36
     # Of x, y and the turn about z.
     for place, deviation in zip((0, 7, 35), guess.spread, strict=True):
         covariance[place] = deviation**2
@@ -225,7 +238,8 @@ def _sensed(reading: Reading, joints: Sequence[str], base: str, lidar: scenario.
     if reading.wheels is not None:
         yield "joint_states", WHEELS, at, _wheels(at, joints, reading.wheels)
     if reading.imu is not None:
-        imu, yaw = reading.imu, reading.estimate.heading
+        imu = reading.imu
+        yaw = reading.estimate.heading
         yield (
             "imu",
             IMU,
@@ -239,7 +253,8 @@ def _sensed(reading: Reading, joints: Sequence[str], base: str, lidar: scenario.
             },
         )
     if reading.scan is not None and lidar is not None:
-        scan, frame = reading.scan, f"{base}/lidar"
+        scan = reading.scan
+        frame = f"{base}/lidar"
         there = transform(scan.time, base, frame, (*scan.origin, 1.0, 0.0, 0.0, 0.0))
         yield TRANSFORMS, TF, scan.time, {"transforms": [there]}
         angles = scan.angles
@@ -313,21 +328,27 @@ def pose(at: Pose) -> Message:
 def marker(number: int, frame: str, name: str, at: Pose, shape: Shape, color: Color) -> Message | None:
     """A shape at `at` in `frame`; None for a plane, which has no end."""
     # The kind of marker, its size along its axes, m, and the corners of its triangles.
-    kind, points = CUBE, list[Sequence[float]]()
+    kind = CUBE
+    points = list[Sequence[float]]()
     size: tuple[float, ...] = (1.0, 1.0, 1.0)
     match shape:
         case Box():
             size = shape.size
         case Sphere():
-            kind, size = SPHERE, (2 * shape.radius,) * 3
+            kind = SPHERE
+            size = (2 * shape.radius,) * 3
         case Ellipsoid():
-            kind, size = SPHERE, tuple(2 * radius for radius in shape.radii)
+            kind = SPHERE
+            size = tuple(2 * radius for radius in shape.radii)
         case Cylinder():
-            kind, size = CYLINDER, (2 * shape.radius, 2 * shape.radius, shape.length)
+            kind = CYLINDER
+            size = (2 * shape.radius, 2 * shape.radius, shape.length)
         case Capsule():
-            kind, size = CYLINDER, (2 * shape.radius, 2 * shape.radius, shape.length + 2 * shape.radius)
+            kind = CYLINDER
+            size = (2 * shape.radius, 2 * shape.radius, shape.length + 2 * shape.radius)
         case Mesh():
-            kind, points = TRIANGLES, shape.vertices[shape.faces].reshape(-1, 3).tolist()
+            kind = TRIANGLES
+            points = shape.vertices[shape.faces].reshape(-1, 3).tolist()
         case _:
             return None
     return {

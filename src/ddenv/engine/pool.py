@@ -67,7 +67,8 @@ PREPARATION = 3600.0
 LONGEST_LOOK = 1.0
 # How often the memory of up to `FEW` workers is looked at, s, and that of more workers as much more rarely: a look takes a third
 # of a millisecond. In this time a process fills 0.4 GB.
-MEMORY_PERIOD, FEW = 0.2, 8
+MEMORY_PERIOD = 0.2
+FEW = 8
 # The maximum time between two looks at the clocks, s.
 CLOCK_PERIOD = 0.1
 
@@ -110,13 +111,16 @@ class _Slot:
 
     def wait(self, begun: bool) -> None:
         """A job is there that has `begun`, or is in preparation until its first moment."""
-        self.moment, self.begun, self.clock = None, begun, Stopwatch(LONGEST_LOOK)
+        self.moment = None
+        self.begun = begun
+        self.clock = Stopwatch(LONGEST_LOOK)
 
     def go_on(self, moment: Moment) -> None:
         """The job has come so far. What came before it began to move does not count."""
         self.moment = moment
         if self.clock.since != moment.begun:
-            self.begun, self.clock = True, Stopwatch(LONGEST_LOOK, moment.begun)
+            self.begun = True
+            self.clock = Stopwatch(LONGEST_LOOK, moment.begun)
 
 
 class Pool:
@@ -166,7 +170,8 @@ class Pool:
 
     def _start(self, job: Job) -> _Slot:
         slot = min((slot for slot in self._slots if slot.job is None), key=lambda slot: not slot.ready)
-        slot.job, slot.result = job, None
+        slot.job = job
+        slot.result = None
         self._hand_over(slot)
         return slot
 
@@ -251,7 +256,8 @@ class Pool:
 
     def _replace(self, slot: _Slot, broken: Broken | None) -> None:
         """A new worker for one that is gone, whose job has the result `broken`, or is made again."""
-        slot.worker, slot.ready = self._worker(), False
+        slot.worker = self._worker()
+        slot.ready = False
         if slot.job is None or slot.result is not None:
             return
         slot.result = broken

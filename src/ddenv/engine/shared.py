@@ -82,8 +82,10 @@ def _asked(created: Created) -> Any:
     """The elements, and the scenario without its paths, and of how it is reduced only whether tests end early: contents of files
     are compared.
     """
-    scenario, paths = created.scenario, dict.fromkeys(("name", "description", "world", "folder"))
-    robot, reduction = scenario["robot"] | {"model": None}, scenario["reduction"]["early_stop"]
+    scenario = created.scenario
+    paths = dict.fromkeys(("name", "description", "world", "folder"))
+    robot = scenario["robot"] | {"model": None}
+    reduction = scenario["reduction"]["early_stop"]
     return created.elements, scenario | paths | {"robot": robot, "reduction": reduction}
 
 

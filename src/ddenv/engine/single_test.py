@@ -80,7 +80,8 @@ def plan(
         if name not in models:
             raise UserError(f"--leave-out: '{name}' is not one of the {len(models)} models in this world")
     models = tuple(name for name in models if name not in (leave_out or []))
-    reduction, runs = subject.scenario.reduction, range(first_run, first_run + repeat)
+    reduction = subject.scenario.reduction
+    runs = range(first_run, first_run + repeat)
     seeds = [seed_of(reduction, run) for run in runs] if seed is None else range(seed, seed + repeat)
     keeps: list[tuple[frozenset[str], str | None]] = [(frozenset(models), None)]
     if leave_each_out:

@@ -28,7 +28,8 @@ def slice_environment(journal: Journal) -> bool:
     what went: with `accept_rate: kept` it is done after a reduction only if the chance of that is at most what may be lost of the
     rate. In accept mode `ask` it is not done.
     """
-    state, there = journal.state, journal.environment
+    state = journal.state
+    there = journal.environment
     tests, met = _known(journal, there)
     if state.accept_mode == "ask" or not any(test.shows_f for test in tests):
         return False
@@ -39,7 +40,8 @@ def slice_environment(journal: Journal) -> bool:
     for models in met:
         left |= models
     # With what goes together with them.
-    ties, before = journal.ties, NOTHING
+    ties = journal.ties
+    before = NOTHING
     assert ties is not None
     together = Stacks.of(map(journal.models, stacks_of(state, state.environment)))
     while left != before:
@@ -47,14 +49,16 @@ def slice_environment(journal: Journal) -> bool:
         left = together.of_any(ties.closed(left, there))
     if left == there or journal.is_refused(left) or state.evidence_test is None:
         return False
-    audit, chose = audit_is_due(state), tuple(test.id for test in tests)
+    audit = audit_is_due(state)
+    chose = tuple(test.id for test in tests)
     journal.record(Sliced(journal.number(left), chose, state.evidence_test, audit))
     return True
 
 
 def slice_audit(journal: Journal) -> tuple[Wanted, ...]:
     """The last similar run, to be simulated in the slice that the environment was cut down to, if that is due and not made yet."""
-    state, here = journal.state, journal.state.here
+    state = journal.state
+    here = journal.state.here
     if here is None or not here.to_audit or here.evidence_test is None or state.refuted is not None:
         return ()
     environment = journal.environment
@@ -68,7 +72,8 @@ def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Envir
     """
     tests: list[Test] = []
     met: dict[int, Environment] = {}
-    ties, exact = journal.ties, exact_runs(journal.state)
+    ties = journal.ties
+    exact = exact_runs(journal.state)
     for test in rested_on(journal.state):
         if not test.is_sound:
             continue

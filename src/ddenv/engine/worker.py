@@ -40,7 +40,8 @@ PERIOD = 0.1
 # The maximum length of the reason why a simulator broke, in characters.
 REASON = 400
 # How many of its last lines are kept in the reason why a worker died, and how much of a test's output the log gets, bytes.
-LAST_LINES, LOGGED = 3, 100_000
+LAST_LINES = 3
+LOGGED = 100_000
 LEFT_OUT = b"\n(the rest of what this test printed is left out)\n"
 # How long a worker whose pipe is closed may take to end, s.
 END_WAIT = 5.0
@@ -222,7 +223,9 @@ def _progress(tell: Callable[[Moment], object]) -> Progress:
         now = time.monotonic()
         if not begun or time_s == 0.0:
             # What came before, such as rehearsals of piles, or a start in a plant that was too small, is not the test's own time.
-            begun, due, starts = now, now, models
+            begun = now
+            due = now
+            starts = models
         if now >= due:
             due = now + PERIOD
             tell(Moment(begun, time_s, pose, {name: at for name, at in models.items() if at != starts.get(name)}))
@@ -252,7 +255,9 @@ class WorkerProcess:
         self._process.start()
         theirs.close()
         printed.close()
-        self._said, self._logged, self._silent = Complaints(), 0, False
+        self._said = Complaints()
+        self._logged = 0
+        self._silent = False
 
     @property
     def pid(self) -> int:
@@ -265,7 +270,8 @@ class WorkerProcess:
 
     def give(self, task: Task) -> None:
         """Hands over a task. Does nothing if the worker is dead; that is seen by its handles."""
-        self._said, self._logged = Complaints(), 0
+        self._said = Complaints()
+        self._logged = 0
         with suppress(OSError):
             self._line.send(task)
 

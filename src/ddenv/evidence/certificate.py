@@ -41,17 +41,24 @@ NEEDED_SHARE = 0.8
 REFUTED = 20.0
 # In the first runs, and while what is left shows f in such a share of them, the whole world runs only where what is left missed f:
 # one more seed tells more than a run of the whole world.
-ALONE_SHARE, ALONE_FIRST = 0.7, 10
+ALONE_SHARE = 0.7
+ALONE_FIRST = 10
 # The maximum number of pairs for what is left and for a removal. A removal is given up after some if its bets would have to grow so
 # many times as fast as they did.
-MOST_PAIRS, MOST_REMOVAL_PAIRS, FEWEST_PAIRS, HOPE = 300, 240, 100, 4.0
+MOST_PAIRS = 300
+MOST_REMOVAL_PAIRS = 240
+FEWEST_PAIRS = 100
+HOPE = 4.0
 # Where f is shown to be rarer without a model and seems to keep so much of its rate, more than so many pairs would decide little,
 # unless the bet that it does has won such a part of what it needs.
-HELPS_AFTER, HELPS_SHARE, NEARLY = 60, 0.75, 0.2
+HELPS_AFTER = 60
+HELPS_SHARE = 0.75
+NEARLY = 0.2
 # If the runs decide nothing, a model without which f seems to keep so much of its rate is not needed.
 ABOUT_AS_OFTEN = 0.9
 # Where f shows no more at all, a certificate ends after so many pairs; after more if f is rare, so that some would surely show it.
-VAIN, SURELY = 30, 0.999
+VAIN = 30
+SURELY = 0.999
 # Where chosen runs are reduced exactly, so many others say how often f shows with other seeds.
 RUNS_BESIDE = 20
 # Where the whole world repeats to the last bit with any seed, one run shows whether what is left depends on the seed.
@@ -59,7 +66,8 @@ RUNS_BESIDE_ALIKE = 1
 # More broken runs of one claim than this, and than a tenth, leave it unknown.
 MOST_BROKEN = 5
 # An earlier environment is judged by a sequential test of this log-likelihood ratio, and at most so many runs.
-ENOUGH_RATIO, MOST_EARLIER = 3.0, 60
+ENOUGH_RATIO = 3.0
+MOST_EARLIER = 60
 # Each bet is divided among these stakes, parts of the highest possible one: most of it is where f nearly always or never shows.
 STAKES = {0.3: 0.15, 0.65: 0.25, 0.95: 0.6}
 
@@ -202,7 +210,8 @@ class Settling:
 
     def __init__(self, procedure: Procedure) -> None:
         # Every procedure asks for a run.
-        self._procedure, self._wanted = procedure, next(procedure)
+        self._procedure = procedure
+        self._wanted = next(procedure)
         self._tests: list[NumberedRun] = []
         self._broken = 0
         self._settled: Claim | None = None
@@ -246,7 +255,10 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     if left == whole:
         return (yield from _shows(whole, terms))
     # `assumed` takes f to show in the whole world where that did not run; `sound` takes it not to show there.
-    assumed, sound, bound, run = Pairs(), Pairs(), 0.0, 0
+    assumed = Pairs()
+    sound = Pairs()
+    bound = 0.0
+    run = 0
     # The seeds with which only what is left has run, and showed f.
     hits: list[int] = []
     mine: Shown = True
@@ -258,12 +270,14 @@ def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
         if hits and not alone:
             mine = True
             (theirs,) = yield Wanted(((whole, hits.pop(0)),), (whole,), bound)
-            assumed, sound = replace(assumed, both=assumed.both - 1), replace(sound, first=sound.first - 1)
+            assumed = replace(assumed, both=assumed.both - 1)
+            sound = replace(sound, first=sound.first - 1)
         elif alone:
             (mine,) = yield Wanted(((left, run),), (left,), bound)
             if mine is True:
                 hits.append(run)
-                assumed, sound = assumed.after(True, True), sound.after(True, False)
+                assumed = assumed.after(True, True)
+                sound = sound.after(True, False)
             else:
                 (theirs,) = yield Wanted(((whole, run),), (left,), bound)
             run += 1
@@ -303,7 +317,10 @@ def falls(
     frequent than `share`, each wrong in at most 1 / `REFUTED` of the cases. "not needed": it seems to show about as often; that
     has no error, and the next certificate has to show it.
     """
-    assumed, sound, bound, rarer = Pairs(), Pairs(), 1.0, False
+    assumed = Pairs()
+    sound = Pairs()
+    bound = 1.0
+    rarer = False
     for run in range(MOST_REMOVAL_PAIRS):
         mine, theirs = yield Wanted(((without, first + run), (left, first + run)), (without, left), bound)
         assumed = assumed.after(mine is not False, theirs is True)
@@ -350,7 +367,8 @@ def good_enough(earlier: Environment, rate: float, keep_rate: float, lost_rate: 
 Expected = tuple[int, int, int]
 
 # It takes so many times the expected number, if the rates are right.
-SHORTER, LONGER = 0.55, 2.2
+SHORTER = 0.55
+LONGER = 2.2
 # Of the pairs of runs with the same seed, so many end alike whatever their rates are.
 ALIKE = 0.4
 # The wealth that a bet of the first certificate needs.
@@ -367,7 +385,8 @@ def certificate_tests(rate: float, certify_rate: float, left: int, at_least: int
     `rate` is the whole world's. It was `seen` in so many runs and may be another one; with 0 it is known.
     """
     # A damaged run file may ask for nothing, or for all.
-    rate, certify_rate = min(max(rate, 0.0), 1.0), min(max(certify_rate, 0.01), 0.99)
+    rate = min(max(rate, 0.0), 1.0)
+    certify_rate = min(max(certify_rate, 0.01), 0.99)
     seen = min(max(0, seen), MOST_PAIRS)
     rates = [rate, *(wilson_interval(round(rate * seen), seen, EIGHT_OF_TEN) if seen else ())]
     ends = [_expected(each, certify_rate, left, at_least) for each in rates]
@@ -388,7 +407,8 @@ def certificate_from_here(made: int, left_runs: int, open_pairs: Sequence[int], 
 
     Each claim about a model that is not decided has so many `open_pairs`. `runs` pairs of all removals were as `seen`.
     """
-    with_it, second = (seen.both + seen.second) / runs, max(seen.second, 0.5) / runs
+    with_it = (seen.both + seen.second) / runs
+    second = max(seen.second, 0.5) / runs
     ends = []
     for share in (second, *wilson_interval(seen.second, runs, EIGHT_OF_TEN)):
         each = _removal_pairs(max(0.0, with_it - share), seen.first / runs, max(share, 0.01))

@@ -75,8 +75,10 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
     """What the runs of a certificate have shown by now, by the model that they leave out; None is what is left. Models that no run
     has left out yet are missing.
     """
-    node, whole = state.nodes[certificate.node], state.environments[origin(state, certificate.node).id]
-    left, outcomes = state.environments[node.id], _outcomes(state, certificate)
+    node = state.nodes[certificate.node]
+    whole = state.environments[origin(state, certificate.node).id]
+    left = state.environments[node.id]
+    outcomes = _outcomes(state, certificate)
     rests = {
         test.without: state.environments[test.environment]
         for test in _finished(state, certificate)
@@ -184,7 +186,8 @@ def expected_fresh_runs(state: RunState, now: Certificate) -> Expected:
     expected = certificate_tests(now.rate, now.certify_rate, left, now.at_least, before)
     if now is not in_the_making(state):
         return expected
-    outcomes, claims = _outcomes(state, now), so_far(state, now)
+    outcomes = _outcomes(state, now)
+    claims = so_far(state, now)
     removals = [claim for name, claim in claims.items() if name is not None]
     pairs = [len(claim.rests_on) // 2 for claim in removals]
     if max(pairs, default=0) < PAIRS_THAT_SHOW:
@@ -284,7 +287,8 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
             continue
         counts = Counter(test.outcome for test in of if test.is_finished)
         outcomes = tuple((outcome, counts[outcome]) for outcome in OUTCOMES if counts[outcome])
-        runs, shown = counts.total() - sum(counts[outcome] for outcome in BROKEN), counts["similar"]
+        runs = counts.total() - sum(counts[outcome] for outcome in BROKEN)
+        shown = counts["similar"]
         found.append(FreshRuns(node, without, shown, runs, *anytime_interval(shown, runs), outcomes, running))
     bounds = {} if claims else {without: claim.bound for without, claim in so_far(state, certificate).items()}
     left_runs, whole_runs = ({test.run for test in tests.get((node, None), [])} for node in (certificate.node, first))

@@ -19,7 +19,9 @@ APART = 3.0
 # Nearer than this part of epsilon, groups are noise.
 NEAR = 0.25
 # With fewer ends nothing is said; more of them take too long. Of fewer than `FEW` ends nobody knows how wide their group is.
-FEWEST, MOST, FEW = 5, 100, 2
+FEWEST = 5
+MOST = 100
+FEW = 2
 # Ends farther than so many epsilons from each of them are not those of one failure.
 ONE_PLACE = 4.0
 # The chance that ends from one distribution are said to lie elsewhere.
@@ -90,7 +92,8 @@ def elsewhere(whole: Sequence[Place], left: Sequence[Place], epsilon: float) -> 
 
     For each group of all these ends the exact test of Fisher compares how many of both are in it.
     """
-    whole, left = whole[: MOST // 2], left[: MOST // 2]
+    whole = whole[: MOST // 2]
+    left = left[: MOST // 2]
     found = groups_of((*whole, *left), epsilon)
     if found is None:
         return None

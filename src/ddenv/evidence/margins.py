@@ -22,17 +22,25 @@ from ddenv.text import Names
 # "impossible" in the world, "" while it is open.
 Verdict = Literal["f", "goal", "other", "undecided", "impossible", ""]
 # f still shows at `SHOWS` of its rate rather than at `GONE` of it; the robot reaches its goal at the rate `REACHED`, not `MISSED`.
-SHOWS, GONE, REACHED, MISSED = 0.9, 0.1, 0.9, 0.25
+SHOWS = 0.9
+GONE = 0.1
+REACHED = 0.9
+MISSED = 0.25
 # The chance that any claim of a call is wrong is at most this.
 ERROR = 0.05
 # The maximum number of runs of a value, of a number, and of that in a first look where several share a budget.
-MOST_RUNS, MOST_OF_NUMBER, FIRST_LOOK = 16, 120, 32
+MOST_RUNS = 16
+MOST_OF_NUMBER = 120
+FIRST_LOOK = 32
 # Where f shows more rarely than this in what is left, no few runs say where it is gone.
 RAREST = 0.25
 # So many fresh runs judge each of so many fixes, from this run on: far from those of a reduction, its certificates and isolations.
-FIX_RUNS, MOST_FIXES, FIRST_FIX_RUN = 20, 3, 500_000_000
+FIX_RUNS = 20
+MOST_FIXES = 3
+FIRST_FIX_RUN = 500_000_000
 # Values are tried outward from the present one by growing steps: so many to the end of the range, the first as a share of it.
-STEPS, FIRST_SHARE = 3, 1.0 / 16.0
+STEPS = 3
+FIRST_SHARE = 1.0 / 16.0
 # The values between the nearest one at which the goal is reached and the end of the range, as parts of the way.
 BEYOND = (1.0 / 3.0, 2.0 / 3.0)
 # A limit is known well enough within this share of its distance from the present value.
@@ -54,7 +62,9 @@ class Rule:
         for number, outcome in enumerate(outcomes, 1):
             # A broken run says nothing, and only counts against the patience.
             if outcome not in BROKEN:
-                f, goal, sound = f + (outcome == "similar"), goal + (outcome == "pass"), sound + 1
+                f = f + (outcome == "similar")
+                goal = goal + (outcome == "pass")
+                sound = sound + 1
                 # Two claims may be wrong.
                 error = self.error / 2.0
                 if shows is None:
@@ -216,7 +226,8 @@ def fixes_of(margins: Margins) -> tuple[Fix, ...]:
     tried = ((one.asked, value) for one in margins_of(margins) for side in one.sides for value in side.tried)
     for asked, value in ((asked, one.value) for asked, one in tried if one.verdict == "goal"):
         made = fresh.get((asked.name, value), {})
-        reached, runs = sum(made.values()), len(made)
+        reached = sum(made.values())
+        runs = len(made)
         # A run that broke counts against it.
         shown = leans_to(reached, runs - reached, REACHED, REACHED / 2.0, ERROR) is True
         share = abs(value - asked.now) / asked.scale
@@ -269,7 +280,8 @@ def beyond(asked: NumberAsked, up: bool, value: float) -> tuple[float, ...]:
     """Where the goal has to be reached, too, so that it is said to be reached from `value` on: at the end of the range, and at two
     values between.
     """
-    end, distance = asked.high if up else asked.low, abs(value - asked.now)
+    end = asked.high if up else asked.low
+    distance = abs(value - asked.now)
     left = abs(end - value)
     if left <= asked.resolution:
         return ()

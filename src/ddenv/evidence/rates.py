@@ -27,7 +27,8 @@ def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> In
     """
     if trials < 1 or not 0 <= successes <= trials:
         raise ValueError(f"{successes} of {trials}")
-    rate, z2 = successes / trials, deviations**2
+    rate = successes / trials
+    z2 = deviations**2
     centre = (rate + z2 / (2 * trials)) / (1 + z2 / trials)
     half = deviations / (1 + z2 / trials) * math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials**2))
     # Rounding must not push the rate out of its own interval.
@@ -80,7 +81,8 @@ def shows_at(outcomes: Iterable[bool], rate: float, error: float = 0.01) -> bool
     """
     runs = hits = 0
     for shown in outcomes:
-        runs, hits = runs + 1, hits + shown
+        runs = runs + 1
+        hits = hits + shown
         found = leans_to(hits, runs - hits, rate, rate / 2, error)
         if found is not None:
             return found
@@ -91,7 +93,8 @@ def leans_to(hits: int, misses: int, rate: float, other: float, error: float) ->
     """The same after `hits` and `misses`: whether they speak for `rate` or for `other`, a lower one. Rates above 0.99, or 0.97 for
     `other`, are taken as these: no few runs tell them apart.
     """
-    rate, other = min(rate, 0.99), min(other, 0.97)
+    rate = min(rate, 0.99)
+    other = min(other, 0.97)
     ratio = hits * math.log(rate / other) + misses * math.log((1.0 - rate) / (1.0 - other))
     return ratio > 0 if abs(ratio) >= math.log((1.0 - error) / error) else None
 

@@ -36,7 +36,8 @@ class Ties:
     @classmethod
     def among(cls, pairs: Iterable[tuple[int, int]]) -> Ties:
         """The ties `pairs` of a model and one that it is tied to."""
-        of, on = defaultdict[int, set[int]](set), defaultdict[int, set[int]](set)
+        of = defaultdict[int, set[int]](set)
+        on = defaultdict[int, set[int]](set)
         for model, other in pairs:
             of[model].add(other)
             on[other].add(model)
@@ -53,7 +54,8 @@ class Ties:
 
     def closed(self, models: Environment, there: Environment) -> Environment:
         """`models`, with all models `there` that they are tied to, directly or by others."""
-        found, new = models, models
+        found = models
+        new = models
         while new:
             tied = NOTHING
             for model in new:
@@ -72,7 +74,8 @@ def fresh_chance(met: Sequence[Environment]) -> float:
     """About the chance that a fresh run meets a model that none of these runs `met`: the share of them that met one which no other
     met (leaving each out in turn; after Good, 1953).
     """
-    once, more = NOTHING, NOTHING
+    once = NOTHING
+    more = NOTHING
     for models in met:
         more |= once & models
         once = (once | models) - more

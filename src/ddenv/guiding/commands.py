@@ -28,7 +28,8 @@ from ddenv.text import Data, Names, as_sentence, coordinates, count, first_of, p
 Row = Candidate | Trial
 
 # Maximum number of models that a line names, and maximum width of each name in cells.
-NAMED, LONGEST = 2, 32
+NAMED = 2
+LONGEST = 32
 
 FINISHED = "the run is finished; u, h, f, c, p, w and o continue from here"
 NO_FAILURE = "f is not known yet: the baseline comes first"
@@ -97,7 +98,8 @@ def numbers_of(state: RunState, names: Iterable[str]) -> Numbers:
 
 def waiting(state: RunState) -> Candidate | None:
     """The candidate whose reduction waits for accept or reject."""
-    round, waits = state.round, state.waiting_candidate
+    round = state.round
+    waits = state.waiting_candidate
     return None if round is None or waits is None else round.candidates[waits]
 
 
@@ -248,7 +250,8 @@ class Change(Asked):
         if wrong := [why for name, value in self.settings.items() if (why := _wrong(name, value))]:
             return "; ".join(wrong)
         new = self.new(now.state)
-        budget, done = new.get("budget"), now.state.made
+        budget = new.get("budget")
+        done = now.state.made
         if isinstance(budget, int) and budget <= done:
             return f"budget: {count(done, 'test')} were made already; enter more, or leave it empty"
         baseline = now.state.baseline
@@ -337,7 +340,8 @@ class OfCandidate(Asked):
         return "the candidate" if one is None else one.label
 
     def refusal(self, now: Situation) -> str:
-        state, waits = now.state, waiting(now.state)
+        state = now.state
+        waits = waiting(now.state)
         # When a new search is due, earlier reductions can no longer be accepted.
         if state.round is None or waits is None or state.search_due:
             return "that reduction no longer waits"
@@ -405,7 +409,8 @@ class Pin(Asked):
     models: Numbers
 
     def refusal(self, now: Situation) -> str:
-        names, kept = _names_of(now.state, self.models), frozenset(now.state.environment)
+        names = _names_of(now.state, self.models)
+        kept = frozenset(now.state.environment)
         if not names:
             return NO_MODELS
         if gone := [name for name in names if name not in kept]:
@@ -442,7 +447,8 @@ class Try(Asked):
     models: Numbers
 
     def refusal(self, now: Situation) -> str:
-        state, names = now.state, _names_of(now.state, self.models)
+        state = now.state
+        names = _names_of(now.state, self.models)
         if names is None:
             return NO_MODELS
         keep = frozenset(names)
@@ -472,7 +478,8 @@ class Adopt(Asked):
     trial: int
 
     def refusal(self, now: Situation) -> str:
-        state, trial = now.state, self.meant(now.state)
+        state = now.state
+        trial = self.meant(now.state)
         if trial is None:
             return "there is no such try"
         # What counted as f in the test may no longer count.
@@ -508,7 +515,8 @@ class LeaveOut(Asked):
 
     def evidence(self, state: RunState) -> Test | None:
         """A fresh run without the model that showed f; None if the model does not only help."""
-        found, names = current(state), _names_of(state, (self.model,)) or ()
+        found = current(state)
+        names = _names_of(state, (self.model,)) or ()
         if found is None or not set(names) & set(only_helping(found)):
             return None
         fresh = (test for test in state.confirm_tests if test.node == found.node and test.run >= found.first_run)
@@ -541,23 +549,27 @@ class AcceptOther(Asked):
             return f"test {test.id} did not end in another failure"
         if self.instead:
             return ""
-        label, models = label_of(state, test), state.environments[test.environment]
+        label = label_of(state, test)
+        models = state.environments[test.environment]
         if state.here is None or not models < state.environments[state.here.id]:
             return f"{label} is not part of the current environment"
         return _lacks_pinned(state, label, models.names(state.elements))
 
     def words(self, state: RunState) -> Words:
         test = state.test(self.test)
-        models, label = count(len(state.environments[test.environment]), "model"), label_of(state, test)
+        models = count(len(state.environments[test.environment]), "model")
+        label = label_of(state, test)
         if self.instead:
-            brief, what = "branch to another failure", f"test {test.id}"
+            brief = "branch to another failure"
+            what = f"test {test.id}"
             said = f"a branch reduces the failure of test {test.id}, from {models} on"
             then = (
                 "Reduce this failure instead of f? The run branches: these models become the environment, and only this failure "
                 "counts as f in the branch. Going back in the history (h) restores f and everything found for it."
             )
         else:
-            brief, what = "count another failure as f", printable(label)
+            brief = "count another failure as f"
+            what = printable(label)
             said = f"the other failure of {label} counts as f, too"
             then = "Count this failure as f, too? Then these models become the environment. u takes it back."
         near = test.distance is not None and math.isfinite(test.distance)
@@ -610,7 +622,9 @@ def _begins_anew(command: Command, state: RunState) -> bool:
 
 def question(command: Command, state: RunState) -> str:
     """What is asked before a command is sent, or "": also where it breaks off a certificate, or drops a reduction that waits."""
-    own, now, lost = command.words(state).question, in_the_making(state), drops(command, state)
+    own = command.words(state).question
+    now = in_the_making(state)
+    lost = drops(command, state)
     if now is not None and _begins_anew(command, state):
         made = count(fresh_runs_made(state, now), "run")
         lost = (

@@ -60,7 +60,8 @@ def _pause(now: c.Situation, _: Pointed) -> c.Command | c.StartEngine:
 
 def _accept(now: c.Situation, pointed: Pointed) -> c.Command:
     """Accept what waits, or else what is under the cursor, or else the last try that shows f."""
-    state, row = now.state, pointed.row
+    state = now.state
+    row = pointed.row
     if state.round is not None and (waits := c.waiting(state)):
         return c.Accept(state.round.number, waits.index)
     # While the cursor follows the run, its row may change before the key is pressed.
@@ -95,7 +96,8 @@ def _reject(now: c.Situation, _: Pointed) -> c.Command:
 
 
 def _veto(now: c.Situation, pointed: Pointed) -> c.Command:
-    state, row = now.state, pointed.row
+    state = now.state
+    row = pointed.row
     if isinstance(row, Trial):
         raise UserError(f"{row.label} is your own selection; only candidates of the round can be vetoed")
     if state.round is None:
@@ -111,7 +113,8 @@ def _veto(now: c.Situation, pointed: Pointed) -> c.Command:
 def _pin(now: c.Situation, pointed: Pointed) -> c.Command | None:
     if not _any(now.state, pointed.models):
         return None
-    state, models = now.state, pointed.models
+    state = now.state
+    models = pointed.models
     if all(name in state.pinned for name in models):
         return c.Unpin(c.numbers_of(state, models))
     return c.Pin(c.numbers_of(state, (name for name in models if name not in state.pinned)))

@@ -114,7 +114,8 @@ class Attempt:
 
     def __init__(self, oracle: Oracle, budget: int, moves: Iterable[str] = ()) -> None:
         """After these moves; from the first one that is not possible on, they are dropped."""
-        self.oracle, self.budget = oracle, budget
+        self.oracle = oracle
+        self.budget = budget
         self.moves: Names = ()
         self.tried: list[Tried] = []
         self.ended = False

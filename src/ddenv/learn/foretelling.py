@@ -22,7 +22,8 @@ SAID = {
     "pass": "the goal is reached",
 }
 # Candidates of a round to choose from, and models of a candidate that are named there.
-MOST, FEW = 6, 3
+MOST = 6
+FEW = 3
 # Why something came about, as questions and answers.
 REASONS: dict[str, Data] = yaml.safe_load(Path(__file__).with_name("reasons.yaml").read_text())
 # By the setting `growth`, what n does.
@@ -68,7 +69,8 @@ def _outcome(position: Position, moment: Moment) -> Foretelling | None:
     number = len(moment.after.tests)
     if not isinstance(moment.recorded.event, TestStarted) or not 0 < number <= len(position.end.tests):
         return None
-    test, candidate = position.end.test(number), pointed(moment)
+    test = position.end.test(number)
+    candidate = pointed(moment)
     later = (position.moment(id) for id in position.ids if id > moment.recorded.id)
     ended = (each.recorded for each in later if each is not None and isinstance(each.recorded.event, TestFinished))
     until = next((each.id for each in ended if each.data["test"] == number), None)
@@ -177,8 +179,11 @@ def _parts(position: Position, moment: Moment) -> Foretelling | None:
     after = None if following is None else position.state(following.first).round
     if following is None or after is None or not _is_regular(round, after):
         return None
-    size, n, before = len(after.environment), after.n_partitions, len(round.environment)
-    reduced, grew = size < before, after.n_partitions > round.n_partitions
+    size = len(after.environment)
+    n = after.n_partitions
+    before = len(round.environment)
+    reduced = size < before
+    grew = after.n_partitions > round.n_partitions
     kept = f"{round.candidates[round.winner].label} became E" if round.winner is not None else "E stays as it is"
     right = f"Right: {kept}, and n {f'grows by {n - round.n_partitions}' if grew else f'stays {n}'}."
     options = {

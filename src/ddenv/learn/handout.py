@@ -12,11 +12,13 @@ AS: dict[str, type[Strong] | type[Name]] = {"strong": Strong, "code": Name}
 
 
 def handout(opened: Opened) -> Report:
-    lesson, state = opened.lesson, opened.position.end
+    lesson = opened.lesson
+    state = opened.position.end
     end = state.revision
     about = f"The lesson takes about {lesson.minutes} minutes; its run is {lesson.run.name}."
     lead = (say(Strong("Aim:"), f" {lesson.aim}"), say(about))
-    seen, asked = list[Block](), list[Block]()
+    seen = list[Block]()
+    asked = list[Block]()
     for step, at in zip(lesson.steps, opened.places, strict=True):
         for block in blocks(opened.text(step.text, at)):
             parts: list[Part] = [AS[style](words) if style in AS else words for words, style in block.spans]

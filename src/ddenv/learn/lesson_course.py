@@ -72,7 +72,8 @@ class Course:
     """At a step of the lesson `opened`, or anywhere in a run without one. The event `at` is shown."""
 
     def __init__(self, position: Position, opened: Opened | None = None, score: Score | None = None) -> None:
-        self.position, self._opened = position, opened
+        self.position = position
+        self._opened = opened
         self._steps = () if opened is None else opened.lesson.steps
         self.score = score or Score()
         self.step = 0
@@ -101,7 +102,9 @@ class Course:
 
     @property
     def page(self) -> Page:
-        text, after, asked = blocks(self._text()), blocks(self._after()), self._asked
+        text = blocks(self._text())
+        after = blocks(self._after())
+        asked = self._asked
         if asked is None:
             return Page(text, after=after)
         return Page(text, asked.question, asked.chosen, asked.hint, after)
@@ -116,7 +119,8 @@ class Course:
         return self._said(self._opened.lesson.steps[self.step].text)
 
     def _after(self) -> str:
-        here, activity = self.here, self.activity
+        here = self.here
+        activity = self.activity
         if activity is None or here is None or self._opened is None or self.is_open:
             return ""
         if self.due:
@@ -141,7 +145,8 @@ class Course:
 
     def go_on(self) -> bool:
         """To what comes next. False at the end, or while something is open that should be answered, done or skipped."""
-        asked, reason = self._asked, None if self._asked is None else self._asked.then
+        asked = self._asked
+        reason = None if self._asked is None else self._asked.then
         if self.is_open or (self.due and self._own is None):
             return False
         if asked is not None and reason is not None:
@@ -176,7 +181,8 @@ class Course:
 
     def _return(self) -> None:
         assert self._own is not None
-        (self._asked, at), self._own = self._own, None
+        (self._asked, at) = self._own
+        self._own = None
         self.position.go(at)
 
     def answer(self, place: int) -> Answer | None:
@@ -193,7 +199,8 @@ class Course:
     def skip(self) -> bool:
         """Shows the answer of an open question without a score, or passes over what there is to do; False if there is nothing."""
         if self._asked is None or not self.is_open:
-            skipped, self.due = self.due, False
+            skipped = self.due
+            self.due = False
             return skipped
         # A skipped prediction has no reason to give.
         self._settle(replace(self._asked, chosen=-1, then=None))
@@ -212,7 +219,10 @@ class Course:
             self.position.go(asked.until)
 
     def _come(self, step: int) -> None:
-        self.step, self._asked, self.due, self._own = step, None, False, None
+        self.step = step
+        self._asked = None
+        self.due = False
+        self._own = None
         self.score = self.score.at(step, self.last)
         if self._opened is None:
             return
@@ -221,13 +231,15 @@ class Course:
             return
         here = self._steps[step]
         if here.question is not None:
-            asked, said = here.question, self._said
+            asked = here.question
+            said = self._said
             answers = tuple(replace(each, text=said(each.text), why=said(each.why)) for each in asked.answers)
             self._asked = Asked(str(step), Question(said(asked.text), answers, said(asked.hint)))
         elif (found := self._opened.foretold[step]) is not None:
             self._asked = Asked(str(step), found.question, found.until, found.reason)
         elif here.race:
-            self.due, self._asked = True, Asked(str(step), bet(self._opened.racers(here)))
+            self.due = True
+            self._asked = Asked(str(step), bet(self._opened.racers(here)))
         elif (attempt := self.attempt) is not None:
             self.due = not attempt.ended
 

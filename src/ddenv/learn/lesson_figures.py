@@ -54,7 +54,8 @@ def _fresh_whole(state: RunState) -> str:
     outcomes = [test.outcome for test in whole if test.outcome in ("similar", "other", "pass")]
     if not outcomes or {test.run for test in whole} < {test.run for test in tests if test.node == found.node}:
         return "no fresh run"
-    shown, runs = outcomes.count("similar"), len(outcomes)
+    shown = outcomes.count("similar")
+    runs = len(outcomes)
     return claims.rate(Claim(None, "", shown, runs, *anytime_interval(shown, runs)))
 
 

@@ -73,7 +73,8 @@ class Play:
 
 def recorded_play(name: str, oracle: Oracle) -> Play:
     """What the algorithm or pair `name` did with an oracle. Raises UserError if that does not fit the oracle."""
-    environment, turns = oracle.models, list[Turn]()
+    environment = oracle.models
+    turns = list[Turn]()
     for number, round in enumerate(oracle.rounds[name], 1):
         if sorted(model for part in round.parts for model in part) != sorted(environment) or not round.tested:
             raise UserError(f"plays: {name}: round {number}: its parts do not make up the models that were left")
@@ -98,7 +99,8 @@ def recorded_play(name: str, oracle: Oracle) -> Play:
 
 def plays_of_runs(runs: Sequence[Path]) -> tuple[Play, ...]:
     """The searches of these runs, which must be of one world. Raises UserError."""
-    found, worlds = list[Play](), list[tuple[bytes, set[str]]]()
+    found = list[Play]()
+    worlds = list[tuple[bytes, set[str]]]()
     for run in runs:
         with RunFile(run) as file:
             found.append(_play_of_run(run, file.events()))
@@ -113,7 +115,9 @@ def plays_of_runs(runs: Sequence[Path]) -> tuple[Play, ...]:
 
 def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
     """The search of a run. Tests that others imply cost nothing, and are no turns."""
-    state, turns, begun = RunState(), list[Turn](), dict[int, tuple[Candidate | Trial, bool]]()
+    state = RunState()
+    turns = list[Turn]()
+    begun = dict[int, tuple[Candidate | Trial, bool]]()
     for recorded, _, state in steps(events):
         event = recorded.event
         if isinstance(event, TestStarted):
@@ -121,7 +125,8 @@ def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
             if (candidate := made_for(state, test)) is not None:
                 begun[test.id] = candidate, test.run > 0
         elif isinstance(event, TestFinished) and event.test in begun:
-            test, (candidate, again) = state.test(event.test), begun[event.test]
+            test = state.test(event.test)
+            (candidate, again) = begun[event.test]
             turns.append(Turn(candidate, test.round or 0, test.outcome, state.environment, again))
         elif turns and state.environment is not turns[-1].left:
             turns[-1] = replace(turns[-1], left=state.environment)
@@ -188,7 +193,8 @@ class Race:
 
     def go(self, at: int) -> bool:
         """To another number of tests; False if it is there already."""
-        before, self.at = self.at, max(0, min(at, self.longest))
+        before = self.at
+        self.at = max(0, min(at, self.longest))
         return self.at != before
 
     def now(self, play: Play) -> Turn | None:
@@ -206,7 +212,8 @@ def result(plays: Sequence[Play]) -> Sentences:
     said = [f"{_and(open_ones)} did not finish, so the number of tests says nothing."] if open_ones else []
     if len(ended) < 2:
         return (*said, "So there is no winner.")
-    first, last = ended[0], ended[-1]
+    first = ended[0]
+    last = ended[-1]
     if first.tests == last.tests:
         return (*said, f"All needed {count(first.tests, 'test')}.")
     best = _and([play.name for play in ended if play.tests == first.tests])
@@ -216,7 +223,8 @@ def result(plays: Sequence[Play]) -> Sentences:
 
 def why(first: Play, last: Play) -> str:
     """Why `first` needed fewer tests than `last`: the kind of tests that makes up most of the difference."""
-    quick, slow = spent(first), spent(last)
+    quick = spent(first)
+    slow = spent(last)
     most = max(KINDS, key=lambda kind: slow[kind] - quick[kind])
     if most != "f showed":
         fewer = f"only {count(quick[most], 'time')}" if quick[most] else "never"
@@ -274,13 +282,15 @@ def bound(models: int, needed: int) -> int:
 
 
 def in_one_sentence(oracle: Oracle, plays: Sequence[Play], attempt: Attempt) -> str:
-    tests, held = count(len(attempt.tried), "test"), count(len(attempt.held), "model")
+    tests = count(len(attempt.tried), "test")
+    held = count(len(attempt.held), "model")
     done = sorted((play for play in plays if not oracle.could_go(play.left)), key=lambda play: play.tests)
     others = first_of([f"{play.name} {play.tests}" for play in done], NAMED)
     if not attempt.found:
         behind = f" The algorithms went on until none could: {others}." if others else ""
         return f"After {tests} you stopped at {held}, and at least one of them can still go.{behind}"
-    found, least = f"You found {held} in {tests}", bound(len(oracle.models), len(attempt.held))
+    found = f"You found {held} in {tests}"
+    least = bound(len(oracle.models), len(attempt.held))
     if len(attempt.tried) < least:
         luck = f"{found}, fewer than {least}: luck or a look at the map helped you."
         return f"{luck} The algorithms: {others}." if others else luck

@@ -82,7 +82,8 @@ class Opened:
 
     @cached_property
     def places(self) -> tuple[int, ...]:
-        found, at = [], self.position.ids[0]
+        found = []
+        at = self.position.ids[0]
         for step in self.lesson.steps:
             at = step.at or at
             found.append(at)

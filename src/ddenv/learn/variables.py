@@ -26,8 +26,10 @@ class Variable:
 
 def variables(moment: Moment) -> tuple[Variable, ...]:
     """E, n_partitions, subenvironments, s, result, results, in the order of the algorithm."""
-    candidate, round = pointed(moment), moment.before.round
-    now, earlier = _values(moment.after, candidate), None
+    candidate = pointed(moment)
+    round = moment.before.round
+    now = _values(moment.after, candidate)
+    earlier = None
     # The candidate as it was before, if it is one of the same round.
     if candidate and round and round.split is candidate.split and candidate.index < len(round.candidates):
         earlier = round.candidates[candidate.index]
@@ -36,7 +38,8 @@ def variables(moment: Moment) -> tuple[Variable, ...]:
 
 
 def _values(state: RunState, candidate: Candidate | None) -> dict[str, str]:
-    round, said = state.round, []
+    round = state.round
+    said = []
     tests = [] if candidate is None else state.tests_of(candidate.tests)
     # All candidates in short, with their verdicts; the current one between brackets. `-A` is all without A.
     for one in () if round is None else round.candidates:

@@ -19,13 +19,19 @@ Cell = tuple[int, int]
 ROOM = 20  # cells for each letter, so that the map stays readable
 # One per model, the largest first: without S and G, which mark start and goal, and without look-alikes.
 SIGNS = "ABCDEFHJKLMNPQRTUVWXYZabcdefghijkmnopqrstuvwxyz23456789"
-NO_SIGN, FLOORS, FAINT_SIGN = "+", ".:", "░"
-HALF_TOP, HALF_BOTTOM, FULL = "▀", "▄", "█"
+NO_SIGN = "+"
+FLOORS = ".:"
+FAINT_SIGN = "░"
+HALF_TOP = "▀"
+HALF_BOTTOM = "▄"
+FULL = "█"
 GREY: RGB = (120, 120, 124)
 SHADE: RGB = (70, 70, 74)
-FAINT, DIM = packed(GREY), packed(SHADE)
+FAINT = packed(GREY)
+DIM = packed(SHADE)
 # Limits of brightness (mean of red, green and blue, 0..255) for visibility on all terminals.
-DARKEST, BRIGHTEST = 60.0, 225.0
+DARKEST = 60.0
+BRIGHTEST = 225.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +52,8 @@ def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Coll
 
     `grid` (2 rows, columns) holds the owners of pixels, `centers` (N, 2) are in pixels; `taken` cells stay free.
     """
-    rows, columns = grid.shape[0] // 2, grid.shape[1]
+    rows = grid.shape[0] // 2
+    columns = grid.shape[1]
     cells = label_cells(grid, centers)
     named = np.array([bool(text) for text in signs.texts], dtype=bool)
     seen = np.flatnonzero((cells[:, 0] >= 0) & named)
@@ -56,7 +63,8 @@ def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Coll
     kept: np.ndarray = signs.sure[seen] | (np.arange(len(seen)) < rows * columns // ROOM)
     kept[np.unique(signs.groups[seen], return_index=True)[1]] = True
     seen = seen[kept]
-    occupied, placed = set(taken), dict[int, Cell]()
+    occupied = set(taken)
+    placed = dict[int, Cell]()
 
     def put(index: int, row: int, column: int) -> bool:
         """Puts the sign of a model there if all its cells are free. Returns whether they are."""
@@ -100,7 +108,8 @@ def signs(models: Sequence[Drawn]) -> list[str]:
 def picture(models: Sequence[Drawn], view: View, *, color: bool, dim: Collection[str] = ()) -> Canvas:
     """All models in `view`, each with its sign; those that are `dim` have none. `PLAIN` is the terminal's own colour."""
     canvas = Canvas(view.rows, view.columns, GREY)
-    canvas.fore[:], canvas.back[:] = PLAIN, PLAIN
+    canvas.fore[:] = PLAIN
+    canvas.back[:] = PLAIN
     outlines = [each.outline for each in models]
     grid = owners(masks(outlines, view), view)
     faint = [each.model.name in dim for each in models]
@@ -137,14 +146,18 @@ def _blocks(canvas: Canvas, grid: np.ndarray, fills: Sequence[int]) -> None:
     """Two pixels per cell; the terminal's own colour can only be the background of a block."""
     assert EMPTY == -1
     colors = np.array([*fills, PLAIN], dtype=np.int32)
-    top, bottom = colors[grid[0::2]], colors[grid[1::2]]
-    upper, lower = top != PLAIN, bottom != PLAIN
+    top = colors[grid[0::2]]
+    bottom = colors[grid[1::2]]
+    upper = top != PLAIN
+    lower = bottom != PLAIN
     canvas.chars[upper] = ord(HALF_TOP)
-    canvas.fore[upper], canvas.back[upper] = top[upper], bottom[upper]
+    canvas.fore[upper] = top[upper]
+    canvas.back[upper] = bottom[upper]
     canvas.chars[~upper & lower] = ord(HALF_BOTTOM)
     canvas.fore[~upper & lower] = bottom[~upper & lower]
     same = upper & (top == bottom)
-    canvas.chars[same], canvas.back[same] = ord(FULL), PLAIN
+    canvas.chars[same] = ord(FULL)
+    canvas.back[same] = PLAIN
 
 
 def _letters(

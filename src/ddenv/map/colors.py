@@ -18,7 +18,8 @@ HUES: tuple[RGB, ...] = (
 )
 # The packed colour of the terminal's default.
 PLAIN = -1
-BLACK, WHITE = 0x000000, 0xFFFFFF
+BLACK = 0x000000
+WHITE = 0xFFFFFF
 
 
 def blend(back: RGB, front: RGB, amount: float) -> RGB:

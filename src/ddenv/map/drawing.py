@@ -26,7 +26,8 @@ FAR = 1e5
 CROSS = 4.0  # half the size of the mark of a model without shapes, pixels
 # Of names: the font, pixels; mean width and height of a letter, relative to the font size; space around, pixels.
 SIZE = 12.0
-WIDTH, HEIGHT = 0.58, 1.15
+WIDTH = 0.58
+HEIGHT = 1.15
 GAP = 3.0
 LONGEST_LABEL = 26  # columns
 MARK = 14.0  # half the size of a mark, with some space, pixels
@@ -61,7 +62,8 @@ class Frame:
         """
         low, high = extent([each.outline for each in models], points)
         aside = np.maximum(max(0.3, margin * float(max(high - low))), (least - (high - low)) / 2)
-        low, high = low - aside, high + aside
+        low = low - aside
+        high = high + aside
         scale = float(min(most / (high - low)))
         sides = np.maximum(high - low, np.array(room) / scale)
         center = (low + high) / 2
@@ -99,7 +101,8 @@ def tick_step(span: float, most: int) -> float:
 
 def ticks(low: float, high: float, step: float) -> list[float]:
     """The multiples of `step` from `low` to `high`, m."""
-    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    first = math.ceil(low / step - 1e-9)
+    last = math.floor(high / step + 1e-9)
     # Adding zero turns -0.0 into 0.0.
     return [number * step + 0.0 for number in range(first, last + 1)]
 
@@ -208,10 +211,12 @@ def place_labels(
     `boxes` (N, 4) are of all models, `floors` (N,) have other models on them. All boxes are left, top, right and bottom, pixels, as
     is the `frame` of the drawing. No label covers the `taken` ones.
     """
-    occupied, placed = list(taken), dict[int, np.ndarray]()
+    occupied = list(taken)
+    placed = dict[int, np.ndarray]()
     areas = np.prod(boxes[:, 2:] - boxes[:, :2], axis=1)
     for index, name in names.items():
-        long, high = width(name) * WIDTH * size + 2 * GAP, HEIGHT * size + GAP
+        long = width(name) * WIDTH * size + 2 * GAP
+        high = HEIGHT * size + GAP
         # Large models may carry the names of others.
         others = ~floors & (areas < LARGE * long * high)
         others[index] = False
@@ -229,7 +234,8 @@ def place_labels(
 def _places(box: np.ndarray, long: float, high: float, floor: bool) -> Iterator[np.ndarray]:
     """Where a name of this size may stand: in the middle of its model or in the corners of a floor, else beside it."""
     left, top, right, bottom = box.tolist()
-    x, y = (left + right) / 2, (top + bottom) / 2
+    x = (left + right) / 2
+    y = (top + bottom) / 2
     middles = [(right + long / 2, y), (left - long / 2, y), (x, top - high / 2), (x, bottom + high / 2)]
     if long <= right - left and high <= bottom - top:
         corners = [

@@ -96,7 +96,8 @@ def footprint(model: Model, corners: int = ROUND, moved: Pose = HERE, ground: fl
             around = (flat[:, None] + radius * circle(corners)).reshape(-1, 2) if radius else flat
             polygons += [outline] if len(outline := convex_hull(around)) else []
     points = np.vstack(polygons) if polygons else np.array([(moved @ model.pose).position[:2]])
-    low, high = points.min(axis=0), points.max(axis=0)
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     return Footprint(model.name, tuple(polygons), (float(low[0]), float(low[1])), (float(high[0]), float(high[1])))
 
 
@@ -106,7 +107,8 @@ def rings(model: Model, moved: Pose) -> tuple[np.ndarray, ...]:
 
 
 def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
-    sides, away = np.roll(polygon, -1, axis=0) - polygon, point - polygon
+    sides = np.roll(polygon, -1, axis=0) - polygon
+    away = point - polygon
     if len(polygon) > 2 and (sides[:, 0] * away[:, 1] >= sides[:, 1] * away[:, 0]).all():
         return 0.0
     lengths = np.einsum("ij,ij->i", sides, sides)
@@ -145,9 +147,11 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
     limit = max(FLOOR_AREA, FLOOR_FACTOR * float(np.median([each.area for each in outlines]))) if models else 0.0
     drawn = []
     for model, outline in zip(models, outlines, strict=True):
-        center, size = model.pose.position, (0.0, 0.0, 0.0)
+        center = model.pose.position
+        size = (0.0, 0.0, 0.0)
         if (box := model_bounds(model)) is not None:
-            center, size = vector((box[0] + box[1]) / 2), vector(box[1] - box[0])
+            center = vector((box[0] + box[1]) / 2)
+            size = vector(box[1] - box[0])
         floor = len(models) > 2 and outline.area > limit and not outline.hollow
         drawn.append(Drawn(model, outline, center, size, _color(model), floor))
     return tuple(sorted(drawn, key=_turn))

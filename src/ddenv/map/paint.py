@@ -62,7 +62,8 @@ class Canvas:
         self.chars[touched] = 0x2800 + bits[touched].astype(np.uint32)
         # Black or white where `color` would not stand out.
         backs = self.back[touched]
-        bright, colors = luminance(backs), np.full(len(backs), color, dtype=np.int32)
+        bright = luminance(backs)
+        colors = np.full(len(backs), color, dtype=np.int32)
         near = (backs >= 0) & (abs(bright - luminance(color)) < LEAST_APART) & (color >= 0)
         colors[near] = np.where(bright[near] > 110, BLACK, WHITE)
         self.fore[touched] = colors
@@ -88,7 +89,9 @@ class Canvas:
 
     def runs(self, row: int) -> Iterator[Run]:
         """A row as text, cut where the style changes."""
-        fore, back, bold = self.fore[row], self.back[row], self.bold[row]
+        fore = self.fore[row]
+        back = self.back[row]
+        bold = self.bold[row]
         text = self.text(row)
         differs = (np.diff(fore) != 0) | (np.diff(back) != 0) | (bold[1:] != bold[:-1])
         cuts = [0, *(np.flatnonzero(differs) + 1).tolist(), len(text)]

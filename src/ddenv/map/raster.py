@@ -25,9 +25,11 @@ SHORT = 3
 EMPTY = -1  # the owner of a pixel without a model
 # The bit of a braille glyph (U+2800 + bits) for the dot at [row, column] of its 4 x 2 grid.
 DOTS = (0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80)
-ARROWS, HOLLOW = "→↗↑↖←↙↓↘", "⇒⇗⇑⇖⇐⇙⇓⇘"
+ARROWS = "→↗↑↖←↙↓↘"
+HOLLOW = "⇒⇗⇑⇖⇐⇙⇓⇘"
 # Limits of the scale, m per pixel.
-FINEST, COARSEST = 0.002, 1e6
+FINEST = 0.002
+COARSEST = 1e6
 MOST_PIXELS = 2_000_000  # painted at a time
 
 
@@ -87,7 +89,8 @@ def fit(
 ) -> View:
     """A view of everything relevant (see `extent`), with a margin in m around it."""
     low, high = extent(prints, points)
-    low, high = low - margin, high + margin
+    low = low - margin
+    high = high + margin
     scale = max((high[0] - low[0]) / max(1, columns), (high[1] - low[1]) / max(1, 2 * rows), FINEST)
     return View(float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2, float(scale), columns, rows)
 
@@ -102,14 +105,16 @@ def extent(prints: Sequence[Footprint], points: Iterable[Point]) -> tuple[np.nda
     boxes = np.array([(*each.low, *each.high, each.area) for each in prints], dtype=float).reshape(-1, 5)
     # Sorted by size: each model and those before it decide whether the next is huge.
     boxes = boxes[np.argsort(boxes[:, 4], kind="stable")]
-    least, most = corners.min(axis=0, initial=math.inf), corners.max(axis=0, initial=-math.inf)
+    least = corners.min(axis=0, initial=math.inf)
+    most = corners.max(axis=0, initial=-math.inf)
     lows = np.minimum.accumulate(np.vstack([least, boxes[:, :2]]))
     highs = np.maximum.accumulate(np.vstack([most, boxes[:, 2:4]]))
     with np.errstate(invalid="ignore"):
         spread = np.maximum(highs - lows, 4.0)[:-1]
     huge = np.flatnonzero(boxes[1:, 4] > 4 * (spread[:, 0] * spread[:, 1])[1:])
     last = huge[0] + 1 if len(huge) else -1
-    low, high = lows[last], highs[last]
+    low = lows[last]
+    high = highs[last]
     if not np.isfinite(low).all():
         return np.array([-5.0, -5.0]), np.array([5.0, 5.0])
     return low, high
@@ -155,7 +160,8 @@ def pack(prints: Sequence[Footprint]) -> Outlines:
     following = np.arange(1, len(corners) + 1)
     following[first + counts - 1] = first
     with np.errstate(invalid="ignore", over="ignore"):
-        low, high = np.minimum.reduceat(corners, first), np.maximum.reduceat(corners, first)
+        low = np.minimum.reduceat(corners, first)
+        high = np.maximum.reduceat(corners, first)
         here = corners - np.repeat(low, counts, axis=0)
         ahead = here[following]
         areas = np.abs(np.add.reduceat(here[:, 0] * ahead[:, 1] - here[:, 1] * ahead[:, 0], first)) / 2
@@ -178,14 +184,16 @@ def masks(prints: Sequence[Footprint], view: View) -> Spans:
 
 
 def spans(outlines: Outlines, view: View) -> Spans:
-    width, height = view.columns, 2 * view.rows
+    width = view.columns
+    height = 2 * view.rows
     polygon, row, left, right = rows_of(outlines, view)
     # What is smaller than a pixel stays visible.
     small = outlines.lengths <= SHORT * view.scale
     tiny = np.concatenate([outlines.models[small], np.flatnonzero(outlines.bare)])
     middle = view.pixels(np.concatenate([outlines.middles[small], outlines.centers[outlines.bare]]))
     seen = ((middle >= 0) & (middle < (width, height))).all(axis=1)
-    tiny, dots = tiny[seen], middle[seen].astype(np.intp)
+    tiny = tiny[seen]
+    dots = middle[seen].astype(np.intp)
     models = np.concatenate([outlines.models[polygon], tiny])
     starts = np.concatenate([row * width + left, dots[:, 1] * width + dots[:, 0]])
     lengths = np.concatenate([right - left + 1, np.ones(len(dots), dtype=np.intp)])
@@ -198,8 +206,10 @@ def rows_of(outlines: Outlines, view: View) -> tuple[np.ndarray, ...]:
 
     A pixel belongs to a polygon if its centre is inside, or to a thin one if it is at most `wider` outside.
     """
-    width, height = view.columns, 2 * view.rows
-    corners, widths = view.pixels(outlines.corners), outlines.widths / view.scale
+    width = view.columns
+    height = 2 * view.rows
+    corners = view.pixels(outlines.corners)
+    widths = outlines.widths / view.scale
     wider = np.where((widths < 1) & (outlines.lengths > SHORT * view.scale), (1 - widths) / 2, 0.0)
     with np.errstate(invalid="ignore"):
         low = np.floor(np.minimum.reduceat(corners, outlines.first) - wider[:, None])
@@ -211,17 +221,22 @@ def rows_of(outlines: Outlines, view: View) -> tuple[np.ndarray, ...]:
     heights = (high - low)[seen, 1]
     polygon = np.repeat(seen, heights)
     row = low[polygon, 1] + _within(heights)
-    left, right = low[polygon, 0].astype(float), high[polygon, 0] - 1.0
+    left = low[polygon, 0].astype(float)
+    right = high[polygon, 0] - 1.0
     # Each edge in turn narrows the rows to its inner side.
     for edge in range(int(outlines.counts[seen].max(initial=0))):
         some = np.flatnonzero(outlines.counts[polygon] > edge)
-        start, count = outlines.first[polygon[some]], outlines.counts[polygon[some]]
+        start = outlines.first[polygon[some]]
+        count = outlines.counts[polygon[some]]
         ax, ay = corners[start + edge].T
         bx, by = corners[start + (edge + 1) % count].T
         # Anticlockwise in the world is clockwise in pixels, whose y points down: inside is dx (y - ay) - dy (x - ax) <= 0.
-        dx, dy = bx - ax, by - ay
+        dx = bx - ax
+        dy = by - ay
         lean = dx * (row[some] + 0.5 - ay) - SLACK - wider[polygon[some]] * np.hypot(dx, dy)
-        up, down, flat = dy > 0, dy < 0, dy == 0
+        up = dy > 0
+        down = dy < 0
+        flat = dy == 0
         with np.errstate(over="ignore"):
             at = ax + lean / np.where(flat, 1.0, dy) - 0.5
         left[some[up]] = np.maximum(left[some[up]], np.ceil(at[up]))
@@ -234,10 +249,14 @@ def rows_of(outlines: Outlines, view: View) -> tuple[np.ndarray, ...]:
 def owners(filled: Spans, view: View, drawn: Sequence[int] | np.ndarray | None = None) -> np.ndarray:
     """The model on each pixel, shape (2 rows, columns): the last of the `drawn` ones (default all) that fill it, else EMPTY."""
     grid = np.full(2 * view.rows * view.columns, EMPTY, dtype=np.int32)
-    models, starts, lengths = filled.models, filled.starts, filled.lengths
+    models = filled.models
+    starts = filled.starts
+    lengths = filled.lengths
     if drawn is not None:
         some = np.isin(models, drawn)
-        models, starts, lengths = models[some], starts[some], lengths[some]
+        models = models[some]
+        starts = starts[some]
+        lengths = lengths[some]
     ends = np.cumsum(lengths)
     # Large overlapping models have many pixels: paint a limited number at a time.
     cuts = np.searchsorted(ends, np.arange(0, ends[-1] if len(ends) else 0, MOST_PIXELS))
@@ -260,7 +279,8 @@ def label_cells(grid: np.ndarray, centers: np.ndarray) -> np.ndarray:
 
     A model that fills no cell takes one whose upper, or else lower, half it fills; -1 if it is not visible.
     """
-    upper, lower = grid[0::2], grid[1::2]
+    upper = grid[0::2]
+    lower = grid[1::2]
     cells = _nearest(np.where(upper == lower, upper, EMPTY), centers)
     for halves in (upper, lower):
         missing = cells[:, 0] < 0
@@ -298,9 +318,11 @@ def braille(points: np.ndarray, view: View, dash: int = 0) -> np.ndarray:
     dots = np.floor(np.vstack([line, places[-1:]])).astype(int)
     if dash:
         dots = dots[np.arange(len(dots)) // dash % 2 == 0]
-    x, y = dots[:, 0], dots[:, 1]
+    x = dots[:, 0]
+    y = dots[:, 1]
     seen = (x >= 0) & (y >= 0) & (x < 2 * view.columns) & (y < 4 * view.rows)
-    x, y = x[seen], y[seen]
+    x = x[seen]
+    y = y[seen]
     np.bitwise_or.at(cells, (y // 4, x // 2), np.array(DOTS, dtype=np.uint8)[y % 4, x % 2])
     return cells
 

@@ -12,8 +12,13 @@ from ddenv.world.model import World
 from ddenv.world.pose import Point, Vector
 
 # Maximum width and height and minimum width of the map, and its margins, pixels.
-WIDEST, HIGHEST, NARROWEST = 1100.0, 780.0, 360.0
-LEFT, TOP, RIGHT, BOTTOM = 64.0, 72.0, 28.0, 52.0
+WIDEST = 1100.0
+HIGHEST = 780.0
+NARROWEST = 360.0
+LEFT = 64.0
+TOP = 72.0
+RIGHT = 28.0
+BOTTOM = 52.0
 CORNERS = 48  # of the polygon that stands for a circle
 LEAST = 2.0  # minimum extent of the world along each axis, m: a single crate must not fill the page
 MOST_LABELS = 60
@@ -48,7 +53,8 @@ def svg_map(world: World, *, spawn: Vector | None = None, goal: Point | None = N
     points = [point[:2] for point in (spawn, goal) if point is not None]
     # A long and narrow world gets a frame that has room for its title.
     frame = Frame.around(models, points, 0.04, LEAST, (WIDEST, HIGHEST), (NARROWEST, NARROWEST / 3), (LEFT, TOP))
-    width, height = frame.box[2] + RIGHT, frame.box[3] + BOTTOM
+    width = frame.box[2] + RIGHT
+    height = frame.box[3] + BOTTOM
     names = labels(models, range(len(models)), MOST_LABELS, frame, points)
     marks = []
     if spawn is not None:

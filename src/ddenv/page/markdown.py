@@ -34,7 +34,8 @@ def markdown(report: Report, stem: str) -> str:
 def pictures(report: Report, stem: str) -> dict[str, str]:
     """The SVG files that the text of the same `stem` shows, by name."""
     style = (HERE / "style.css").read_text()
-    ground, found = '<rect width="100%" height="100%" style="fill: var(--page)"/>', {}
+    ground = '<rect width="100%" height="100%" style="fill: var(--page)"/>'
+    found = {}
     for block in (block for section in report.sections for block in section.blocks):
         if isinstance(block, Picture):
             # It contains its own colours.

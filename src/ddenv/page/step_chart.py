@@ -9,8 +9,12 @@ from ddenv.map.drawing import tick, tick_step, tick_text, ticks
 from ddenv.runfile.state import RunState
 from ddenv.text import count
 
-WIDTH, HEIGHT = 880.0, 300.0
-LEFT, TOP, RIGHT, BOTTOM = 52.0, 26.0, 24.0, 46.0
+WIDTH = 880.0
+HEIGHT = 300.0
+LEFT = 52.0
+TOP = 26.0
+RIGHT = 24.0
+BOTTOM = 46.0
 
 Steps = list[tuple[float, float]]
 # Where (tests, models) is on the chart, pixels.
@@ -25,7 +29,8 @@ def chart(state: RunState) -> str:
     models = steps([(point.tests, point.models) for point in points])
     at = scale(last, most)
     line = path(models, at)
-    (first, floor), (end, _) = at(0, 0), at(last, 0)
+    first, floor = at(0, 0)
+    end, _ = at(last, 0)
     parts = [
         opening(HEIGHT),
         *axes(at, last, most),

@@ -44,7 +44,8 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
     before are skipped. Where none of `MANY_NEEDED` parts could go, a "steady" search ends as
     `splitting` does. The search `proves` that its end is minimal by trying to leave out each single model all the same.
     """
-    environment, n = elements, guide.n_partitions
+    environment = elements
+    n = guide.n_partitions
     missed: list[Environment] = []
     while environment:
         n = min(n, len(environment))
@@ -108,7 +109,8 @@ def _missed(
 
 def _without_implied(round: Round, missed: list[Environment], proves: bool) -> Round:
     """`round` without candidates that lack a whole group of `missed`, or all that an earlier candidate of the round lacks."""
-    lacked, worth = list(missed), []
+    lacked = list(missed)
+    worth = []
     for one in round.candidates:
         if (proves and len(one.lacks) == 1) or not any(group <= one.lacks for group in lacked):
             worth.append(one)
@@ -125,7 +127,8 @@ def ddmin(elements: Partition, guide: Guide | None = None) -> Search:
     Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002. The last model is tested, too. It asks nothing
     of a guide.
     """
-    environment, partitions = elements, _cut(elements, 2)
+    environment = elements
+    partitions = _cut(elements, 2)
     while environment:
         winner = yield in_order(environment, partitions, "partition", "complement")
         if winner is None:
@@ -145,7 +148,8 @@ def ddmin(elements: Partition, guide: Guide | None = None) -> Search:
 
 def _cut(environment: Partition, n: int) -> list[Partition]:
     """Up to n chunks of neighbours, as equal in length as possible."""
-    size, n = len(environment), min(n, len(environment))
+    size = len(environment)
+    n = min(n, len(environment))
     return [environment[size * part // n : size * (part + 1) // n] for part in range(n)]
 
 
@@ -203,12 +207,15 @@ def splitting(elements: Partition, guide: Guide) -> Search:
         likelier = (1.0 + found) / (1.0 + passed)
         spared = _spared(np.array([weight[model] for model in line]) * likelier, misses, guide)
         if spared[0] < DOUBT:
-            passed, found = passed + weight[line[0]], found + 1
-            line, misses = line[1:], {}
+            passed = passed + weight[line[0]]
+            found = found + 1
+            line = line[1:]
+            misses = {}
             continue
         # Rather too few than too many: the near models are the likeliest to be needed.
         size = max(1, int((spared >= _most_telling(guide.rate())).sum()))
-        group, runs = line[:size], misses.get(size, 0) + 1
+        group = line[:size]
+        runs = misses.get(size, 0) + 1
         round = left_out(group, environment)
         # f needs something, we assume: leaving out everything is not worth a test.
         winner = (yield replace(round, runs=runs)) if round.candidates else None
@@ -217,7 +224,8 @@ def splitting(elements: Partition, guide: Guide) -> Search:
             continue
         environment = tuple(model for model in environment if model in winner.models)
         passed += sum(weight[model] for model in group)
-        line, misses = line[size:], {more - size: count for more, count in misses.items() if more > size}
+        line = line[size:]
+        misses = {more - size: count for more, count in misses.items() if more > size}
     return (yield from sweep(environment, guide.runs()))
 
 

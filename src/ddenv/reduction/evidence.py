@@ -16,7 +16,8 @@ from ddenv.text import Names
 Place = tuple[float, float, float]
 
 # Probabilities of being needed stay between these, so that no test is impossible.
-LEAST, MOST = 1e-6, 1.0 - 1e-6
+LEAST = 1e-6
+MOST = 1.0 - 1e-6
 # The expected number of needed models in each e-fold of the distance's rank.
 DENSITY = 0.5
 # How many models are compared with the whole path at a time: 5,000 at once would take hundreds of MB.
@@ -132,8 +133,10 @@ def nearest_on_path(places: Floats, times: Floats, path: Floats) -> tuple[Floats
     The path is the segments between its points, reached at `times` (N,). Of several nearest points the first counts.
     """
     if len(path) == 1:
-        path, times = np.repeat(path, 2, axis=0), np.repeat(times, 2)
-    distances, moments = np.empty(len(places)), np.empty(len(places))
+        path = np.repeat(path, 2, axis=0)
+        times = np.repeat(times, 2)
+    distances = np.empty(len(places))
+    moments = np.empty(len(places))
     for first in range(0, len(places), BLOCK):
         block = slice(first, first + BLOCK)
         apart, fraction = to_segments(places[block], path)

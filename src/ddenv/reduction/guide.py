@@ -57,7 +57,8 @@ def make_guide(
     is instantiated for each guide. `prior` is "uniform", or "spatial" where that can be known. `more` are the other fields of
     `Guide`.
     """
-    split, rank = _made("partitioning", partitioning), _made("prioritization", prioritization)
+    split = _made("partitioning", partitioning)
+    rank = _made("prioritization", prioritization)
 
     def split_now(environment: Partition, n: int) -> list[Partition]:
         known = evidence()

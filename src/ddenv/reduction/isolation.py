@@ -22,7 +22,8 @@ from ddenv.reduction.round import Candidate, Partition, Round, Search, Stacks
 from ddenv.reduction.verdict import Verdict
 
 # A world passes if the robot reaches its goal in so many of its runs, and fails in at most this part of those of the whole world.
-MOSTLY, FAILURES_LEFT = 0.9, 0.2
+MOSTLY = 0.9
+FAILURES_LEFT = 0.2
 # The chance that the search takes a world that does not pass, or misses one that does: fresh runs judge the end.
 SEARCH_ERROR = 0.05
 # After this many runs the likelier side counts; fresh runs that do not decide leave it open.
@@ -144,7 +145,8 @@ def _search(driver: Runs, asked: Asked, smaller: Environment, refuted: set[Envir
     """What has to go, by the seeds of the search; nothing if the robot does not pass without all that may go."""
     within = tuple(model for model in asked.suspects if model in smaller)
     searching = ddmin(within) if smaller else isolating(asked.suspects, asked.size)
-    algorithm, winner = asked.stacks.expand(searching), None
+    algorithm = asked.stacks.expand(searching)
+    winner = None
     while True:
         try:
             round = algorithm.send(winner)
@@ -160,9 +162,11 @@ def _search(driver: Runs, asked: Asked, smaller: Environment, refuted: set[Envir
 
 def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Work[Checked]:
     """Fresh runs show whether the world without `removed` passes, and whether it does with each model of it put back."""
-    passing, error = asked.whole - removed, error_of(number + 1) / 2.0
+    passing = asked.whole - removed
+    error = error_of(number + 1) / 2.0
     backs = {model: passing | asked.stacks.by_first[model] for model in asked.suspects if model in removed}
-    rule, first = asked.rule, asked.first_run + number * asked.block
+    rule = asked.rule
+    first = asked.first_run + number * asked.block
     if isinstance(rule, Each):
         runs = iter([(None, passing, often(passing, asked.at_least))])
         (rate,) = yield from settled(driver, runs, lambda _: False, first, "isolate")
@@ -197,7 +201,8 @@ def isolating(suspects: Partition, first: int) -> Search:
     size = max(1, first)
     while suspects:
         group = suspects[:size]
-        whole, models = Environment.of(suspects), Environment.of(group)
+        whole = Environment.of(suspects)
+        models = Environment.of(group)
         # Its one candidate may be all suspects.
         candidate = Candidate("partition", 0, group, models, whole - models)
         winner = yield Round(1, suspects, (group,), (0.0,), (candidate,))
@@ -218,7 +223,9 @@ def passes(world: Environment, rule: Passing, at_least: int) -> Procedure:
     found: bool | None = None
     while found is None and runs < MOST_RUNS:
         (shown,) = yield Wanted(((world, runs),), (world,))
-        reached, runs, broken = reached + (shown is True), runs + 1, broken + (shown == "broken")
+        reached = reached + (shown is True)
+        runs = runs + 1
+        broken = broken + (shown == "broken")
         # A run that broke counts against what is claimed.
         terms = rule.wanted, rule.rather_than, rule.error
         fails, passing = (leans_to(reached, runs - reached - less, *terms) for less in (broken, 0))

@@ -41,7 +41,8 @@ class Learner:
         self._classifier: SGDClassifier | None = None
         # The models of the first environment, N in all: their features (N, F) and priors (N,), of a removed one as they were last.
         self._columns: dict[str, int] = {}
-        self._rows, self._prior = np.zeros((0, 0)), np.zeros(0)
+        self._rows = np.zeros((0, 0))
+        self._prior = np.zeros(0)
         self._there = np.zeros(0, dtype=bool)
         # The scale of each feature (F,).
         self._mean = self._spread = np.zeros(0)
@@ -65,15 +66,21 @@ class Learner:
 
     def chances(self, environment: Names, evidence: Evidence) -> Floats:
         """The probability that each model is needed, shape (len(environment),). Learns from the tests since the last call."""
-        rows, prior = features(environment, evidence), spatial_prior(environment, evidence)
+        rows = features(environment, evidence)
+        prior = spatial_prior(environment, evidence)
         if not self._columns:
-            count, spread = len(environment), rows.std(axis=0)
+            count = len(environment)
+            spread = rows.std(axis=0)
             self._columns = {name: column for column, name in enumerate(environment)}
-            self._rows, self._prior, self._there = np.zeros_like(rows), np.zeros(count), np.ones(count, dtype=bool)
-            self._mean, self._spread = rows.mean(axis=0), np.where(spread > 1e-9, spread, 1.0)
+            self._rows = np.zeros_like(rows)
+            self._prior = np.zeros(count)
+            self._there = np.ones(count, dtype=bool)
+            self._mean = rows.mean(axis=0)
+            self._spread = np.where(spread > 1e-9, spread, 1.0)
             self._failed = np.zeros((0, count), dtype=bool)
         here = [self._columns[name] for name in environment]
-        self._rows[here], self._prior[here] = (rows - self._mean) / self._spread, prior
+        self._rows[here] = (rows - self._mean) / self._spread
+        self._prior[here] = prior
         self._learn(here, evidence)
         if not self._lessons:
             return prior
@@ -90,8 +97,10 @@ class Learner:
         """Learns from the models that went since the last call, and from new candidates without f."""
         there = np.zeros(len(self._columns), dtype=bool)
         there[here] = True
-        gone, self._there = self._there & ~there, there
-        fresh, self._taken = evidence.trials[self._taken :], len(evidence.trials)
+        gone = self._there & ~there
+        self._there = there
+        fresh = evidence.trials[self._taken :]
+        self._taken = len(evidence.trials)
         similar = {trial.models for trial in fresh if trial.similar}
         failed = dict.fromkeys(trial.models for trial in fresh if trial.models not in similar)
         lacks = np.array([[name not in models for name in self._columns] for models in failed], dtype=bool)
@@ -197,7 +206,8 @@ def features(models: Names, evidence: Evidence) -> Floats:
     rows = np.zeros((len(models), 9))
     rows[:, 0] = np.log(NEAR + distances_to_failure(models, evidence))
     if evidence.trajectory is not None:
-        places, path = evidence.places(models), evidence.path()
+        places = evidence.places(models)
+        path = evidence.path()
         rows[:, 1] = np.log(NEAR + cdist(places, path).mean(axis=1))
         rows[:, 2] = np.log(NEAR + evidence.nearest(models)[:, 0])
     sensed = evidence.first_sensed or {}

@@ -16,7 +16,9 @@ from ddenv.text import Names
 
 # With more clusters or models than this, k-means starts once instead of four times, and with more clusters than this from random
 # models: it would take a second instead of a tenth.
-MANY_CLUSTERS, MANY_MODELS, MOST_CLUSTERS = 100, 500, 500
+MANY_CLUSTERS = 100
+MANY_MODELS = 500
+MOST_CLUSTERS = 500
 
 
 def model2model(environment: Names, n_partitions: int, evidence: Evidence) -> list[Names]:
@@ -67,7 +69,8 @@ def by_span(environment: Names, cuts: Floats, evidence: Evidence) -> list[Names]
 
 def cuts(trajectory: Floats, delta: float, n_spans: int) -> Floats:
     """The times (s) at which the trajectory (N, 5) is cut into `n_spans`, sorted, shape (n_spans - 1,)."""
-    times, lasted = trajectory[:, 0], np.diff(trajectory[:, 0])
+    times = trajectory[:, 0]
+    lasted = np.diff(trajectory[:, 0])
     turn_rates = np.diff(np.unwrap(trajectory[:, 4])) / np.where(lasted > 0, lasted, np.inf)
     sharpness = np.abs(np.diff(turn_rates))
     sharp = np.flatnonzero(sharpness > delta)

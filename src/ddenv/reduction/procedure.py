@@ -261,7 +261,8 @@ def baseline(
 
     Where several failures competed, the most frequent one was lucky in the runs that chose it: as many others give its rate.
     """
-    chose, usual = 0, runs
+    chose = 0
+    usual = runs
     runs = min(usual, enough_alike or usual)
     while True:
         while missing := [run for run in range(runs) if driver.shown(whole, run) is None]:
@@ -275,14 +276,18 @@ def baseline(
         if keeps_rate and found.failures < FEWEST_SHOWN and runs < LONGEST_BASELINE:
             runs += 1
         elif keeps_rate and found.competed and not chose:
-            chose, runs = runs, runs + usual
+            chose = runs
+            runs = runs + usual
         else:
             return driver.failure_fixed(runs)
 
 
 def search_on(driver: Driver, leg: Leg) -> Work[tuple[Environment, ...]]:
     """Takes what the algorithm finds, to its end; returns the chain of environments."""
-    chain, algorithm, winner, number = leg.chain, driver.algorithm(leg), None, leg.first_round
+    chain = leg.chain
+    algorithm = driver.algorithm(leg)
+    winner = None
+    number = leg.first_round
     while True:
         try:
             round = algorithm.send(winner)
@@ -317,11 +322,13 @@ def judge(
     Verdicts come in order: tests of later ones that have ended wait. What is dissimilar, but not by the `usual` rule, was
     missed. Nothing is similar before its first run that showed what is looked for has shown it to its end.
     """
-    judged, refusals = 0, driver.refusals
+    judged = 0
+    refusals = driver.refusals
     while True:
         if refusals != driver.refusals:
             # The user may want a candidate that was passed over after all.
-            judged, refusals = 0, driver.refusals
+            judged = 0
+            refusals = driver.refusals
         in_full = False
         candidates = islice(environments, judged, None)
         verdicts, wanted = standing(candidates, driver.shown, rule, driver.refused, first=judged, enough=driver.workers)
@@ -354,7 +361,8 @@ def judge(
 
 def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Certified]:
     """Fresh runs show whether what is left keeps the rate of f, and whether it falls without each model."""
-    left, whole = chain[-1], leg.whole
+    left = chain[-1]
+    whole = leg.whole
     while missing := [run for run in leg.rule.exact if driver.shown(left, run) is None]:
         yield tuple(Test(left, run, "round") for run in missing)
     certificate = driver.certificate_due()
@@ -465,7 +473,8 @@ def _settled_in_blocks(
     Models have their turn once it looks as if `left` kept the rate: until then their runs may be for nothing. They have none if the
     tests that are left decide too little of each.
     """
-    first_run, terms = certificate.first_run, certificate.terms
+    first_run = certificate.first_run
+    terms = certificate.terms
 
     fresh = _fresh(driver, first_run)
     without = {rest: model for model, rest in rests.items()}
@@ -569,7 +578,9 @@ def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certifie
 
     Only runs by the seeds of this certificate count: by others it was taken, or went back to, which favour it.
     """
-    first, terms, lost = certified.certificate.first_run, certified.certificate.terms, certified.claims[0]
+    first = certified.certificate.first_run
+    terms = certified.certificate.terms
+    lost = certified.claims[0]
     rate = driver.rate()
     fresh = _fresh(driver, first)
     sound = [shown for run in lost.runs if isinstance(shown := fresh(lost.environment, run), bool)]
@@ -590,7 +601,8 @@ def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certifie
 
 def groups_again(good: Environment, bad: Environment, end: Environment) -> list[Partition]:
     """What to leave out of `good` at once: all that went after `bad`, then halves of what went from `good` to `bad`."""
-    later, step = tuple(bad - end), tuple(good - bad)
+    later = tuple(bad - end)
+    step = tuple(good - bad)
     halves = [step[: len(step) // 2], step[len(step) // 2 :]] if len(step) > 1 else []
     return [group for group in (later, *halves) if group]
 
@@ -600,7 +612,8 @@ def last_good(chain: Sequence[Environment], judged: Callable[[Environment], Clai
 
     `chain` ends with what has lost it; the next one has, too. By bisection: it assumes that the rate falls along the chain.
     """
-    good, bad = 0, len(chain) - 1
+    good = 0
+    bad = len(chain) - 1
     while bad - good > 1:
         place = (good + bad) // 2
         claim = judged(chain[place])

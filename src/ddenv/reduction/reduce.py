@@ -39,9 +39,11 @@ REPLAYS = 5
 # A test that turns out to be flaky gets so many re-runs.
 FLAKY_ITERATIONS = 3
 # This share of `most_tests` is for the last certificate alone, which has so many tests in any case.
-CERTIFICATE_SHARE, FEWEST_TESTS = 0.25, 40
+CERTIFICATE_SHARE = 0.25
+FEWEST_TESTS = 40
 # Runs of certificates are numbered from here on, so that they chose nothing; the search never comes so far.
-FIRST_FRESH, EACH_CERTIFICATE = 1_000_000, 1_000_000
+FIRST_FRESH = 1_000_000
+EACH_CERTIFICATE = 1_000_000
 
 # Larger numbers are a mistake, and their squares could be infinite.
 LARGEST = 1e9
@@ -333,7 +335,8 @@ class _Caller:
 
     def algorithm(self, leg: steps.Leg) -> Search:
         """The algorithm, up to where what is left of the calls is needed for a certificate."""
-        search, winner = self.begin(leg), None
+        search = self.begin(leg)
+        winner = None
         while self._affordable >= CERTIFICATE_SHARE * self.most_tests:
             try:
                 winner = yield search.send(winner)
@@ -457,7 +460,8 @@ class _Caller:
         claims = []
         for named in made.claims:
             shown = sum(self._known[named.environment, made.certificate.first_run + run] for run in named.runs)
-            without, claim = None if named.model is None else self.names[named.model], named.claim
+            without = None if named.model is None else self.names[named.model]
+            claim = named.claim
             interval = anytime_interval(shown, len(named.runs))
             claims.append(RateClaim(without, claim.verdict, shown, len(named.runs), *interval, claim.bound))
         self.claims = tuple(claims)

@@ -88,7 +88,8 @@ def round_of(
     candidates: list[Candidate] = []
     seen: set[Environment] = set()
     for kind, number in wanted:
-        models, lacks = parts[number], whole - parts[number]
+        models = parts[number]
+        lacks = whole - parts[number]
         if kind == "complement":
             models, lacks = lacks, models
         if models in seen or not lacks or (not models and len(environment) > 1):

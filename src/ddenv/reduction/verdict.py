@@ -14,7 +14,8 @@ from ddenv.evidence.rates import HIGHEST_RATE, SPURIOUS, Shown, ShownIn
 Verdict = Literal["", "similar", "dissimilar", "unknown"]
 
 # The baseline goes on to this many runs with f, for up to so many runs, where f is rare.
-FEWEST_SHOWN, LONGEST_BASELINE = 3, 60
+FEWEST_SHOWN = 3
+LONGEST_BASELINE = 60
 # Where all runs of a candidate miss f by chance no more often than this, a miss is looked at again only by a certificate.
 FEW_MISSED = 0.003
 # After this many runs the likelier side counts.

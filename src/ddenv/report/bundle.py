@@ -26,8 +26,11 @@ from ddenv.words.claims import meaning, rate, seeds_of, uncertified
 from ddenv.words.margins import rows, said
 from ddenv.world.access import ending_of, write_file
 
-RUN, SCENARIO = BUNDLED_RUN, "scenario.yaml"
-REPORT, ISSUE, AGAIN = "report.html", "ISSUE.md", "repro.py"
+RUN = BUNDLED_RUN
+SCENARIO = "scenario.yaml"
+REPORT = "report.html"
+ISSUE = "ISSUE.md"
+AGAIN = "repro.py"
 MOST_NAMES = 20
 NEEDS = f"needs ddenv-workbench {__version__}: {how_to_install()}"
 # What is written of each bundle; `$words` are filled in.
@@ -71,7 +74,8 @@ def write_test(run: Path, folder: Path) -> list[Path]:
     """
     record = _certified(run)
     name = re.sub(r"\W+", "_", run.stem).strip("_").lower() or "run"
-    test, copy = folder / f"test_{name}.py", folder / f"{name}.ddenv"
+    test = folder / f"test_{name}.py"
+    copy = folder / f"{name}.ddenv"
     for path in (test, copy):
         if path.exists():
             raise UserError(f"{path}: exists already; choose another folder")
@@ -120,7 +124,8 @@ def _filled(template: str, **words: str) -> bytes:
 
 
 def _issue(record: Record, needs: list[str]) -> bytes:
-    state, found = record.state, current(record.state)
+    state = record.state
+    found = current(record.state)
     assert found is not None
     at = f" at ({coordinates(state.f_position[:2])}) m" if state.f_position else ""
     models = [f"- `{_code(name)}`" for name in state.environment[:MOST_NAMES]]

@@ -37,7 +37,8 @@ PHASES = (
     ("isolate", "isolation"),
 )
 # The maximum number of failures in the table, and of models by name.
-MOST, MOST_NAMES = 30, 6
+MOST = 30
+MOST_NAMES = 6
 
 
 def sureness(record: Record) -> Section | None:
@@ -127,7 +128,8 @@ def _meaning(state: RunState, outcome: str) -> str:
 
 def others_met(record: Record) -> Section | None:
     """The section on other failures; None if there is none."""
-    state, found = record.state, atlas(record.state)
+    state = record.state
+    found = atlas(record.state)
     if not found:
         return None
     tests = count(sum(len(each.tests) for each in found), "test")
@@ -152,7 +154,8 @@ def worth(record: Record) -> Section | None:
     state = record.state
     if state.baseline is None or not state.nodes:
         return None
-    found, rows = current(state), [each for each in fresh_runs(state)[:MOST_ROWS] if each.shows]
+    found = current(state)
+    rows = [each for each in fresh_runs(state)[:MOST_ROWS] if each.shows]
     if found is not None:
         return Section("What the result is worth", tuple(_with(state, found)))
     claimed = "what its runs have shown so far still holds" if rows else "nothing is claimed about what is left"
@@ -166,7 +169,8 @@ def worth(record: Record) -> Section | None:
 
 
 def _with(state: RunState, found: Certificate) -> list[Block]:
-    head, rows = ("environment", "runs", "ended", "f shown", "95 % interval", "meaning"), []
+    head = ("environment", "runs", "ended", "f shown", "95 % interval", "meaning")
+    rows = []
     for each in fresh_runs(state)[:MOST_ROWS]:
         ended = ", ".join(f"{number} {outcome}" for outcome, number in each.outcomes)
         has_rate = each.runs and not each.is_chosen
@@ -198,7 +202,8 @@ def _name(each: FreshRuns) -> Cell:
 
 def rate_of_left(state: RunState) -> tuple[str, str]:
     """How often f shows in what is left, and what that is, for the figures at the top."""
-    found, here = current(state), state.here
+    found = current(state)
+    here = state.here
     if found is not None:
         return f"{found.claims[0].shown} of {thousands(found.claims[0].runs)}", "fresh runs show f"
     if here is None or not here.runs:

@@ -22,7 +22,8 @@ OF_DRAKE = ("time_step", "contact")
 
 
 def settings(record: Record) -> Section:
-    scenario, jobs = record.state.scenario, record.state.jobs
+    scenario = record.state.scenario
+    jobs = record.state.jobs
     oracle = section(scenario, "oracle")
     rows: list[tuple[str, Name, str]] = []
     for one in SETTINGS.values():
@@ -49,7 +50,8 @@ def value_words(value: Any) -> str:
 
 
 def repeat(record: Record) -> Section:
-    state, run = record.state, shlex.quote(plain(record.path))
+    state = record.state
+    run = shlex.quote(plain(record.path))
     blocks: list[Block] = []
     if state.baseline is not None:
         kept = "minimal world" if state.certified else "world that is left"

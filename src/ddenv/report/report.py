@@ -34,7 +34,8 @@ def content(record: Record) -> Report:
     damage = (
         say(Strong("Parts of this run could not be read."), f" {plain(each)}.", notice=True) for each in record.troubles
     )
-    version, begun = plain(state.engine_version), moment(record.started)
+    version = plain(state.engine_version)
+    begun = moment(record.started)
     by = f"run by ddenv {version}, " if version and version != __version__ else ""
     when = f", begun {begun} UTC" if begun else ""
     return Report(
@@ -48,7 +49,8 @@ def content(record: Record) -> Report:
 
 
 def _verdict(state: RunState) -> str:
-    left, whole = len(state.environment), len(state.elements)
+    left = len(state.environment)
+    whole = len(state.elements)
     if state.baseline is None:
         return "No failure is known yet"
     if state.certified and not left:
@@ -81,7 +83,8 @@ def _standing(record: Record) -> Paragraph:
 
 def _failure(state: RunState) -> list[Paragraph]:
     """The scenario in its author's words, how the robot failed in it, and what is wrong with the world."""
-    description, position = plain(state.scenario.get("description", "")), state.f_position
+    description = plain(state.scenario.get("description", ""))
+    position = state.f_position
     said = [say(description)] if description else []
     if position is not None:
         said.append(say(f"The failure f: the robot {deed(state.failure)} at ({coordinates(position)}) m."))
@@ -94,7 +97,8 @@ def _failure(state: RunState) -> list[Paragraph]:
 
 def _figures(record: Record) -> tuple[tuple[str, str], ...]:
     state = record.state
-    before, after = len(state.elements), len(state.environment)
+    before = len(state.elements)
+    after = len(state.environment)
     figures = [(f"{before} → {after}" if after != before else str(before), "models")]
     if after < before:
         figures.append((percent(1 - after / before), "smaller"))
@@ -158,14 +162,16 @@ def _check(file: Path) -> None:
 
 def in_short(record: Record) -> list[Paragraph]:
     """The paragraph that a report begins with; none before a failure is known."""
-    state, found = record.state, current(record.state)
+    state = record.state
+    found = current(record.state)
     if state.baseline is None:
         return []
     sure = "Fresh runs have not checked that yet." if found is None else f"{for_everyone(found)}."
     runs = "1 simulated run" if state.made == 1 else f"{thousands(state.made)} simulated runs"
     cost = f"This took {runs} and {duration(spent(state, state.updated_at))} of computing time."
     what = f" The robot {deed(state.failure)} before it reached its goal. "
-    left, whole = state.environment, count(len(state.elements), "model")
+    left = state.environment
+    whole = count(len(state.elements), "model")
     enough: tuple[Part, ...] = (f"Any of the {whole} in its world may be involved.",)
     if not left:
         always = "look at the robot, its goal and what always stays."

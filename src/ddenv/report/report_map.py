@@ -26,7 +26,8 @@ PATHS = ("way", "last", "with", "without", "now", "changed")
 LIMITS = {"f": "until", "goal": "from", "other": "over", "impossible": "over"}
 
 # Of the legend: entries in a line, and pixels from line to line.
-ACROSS, LINE = 4, 24.0
+ACROSS = 4
+LINE = 24.0
 
 
 # Around (0, 0): where the robot starts, where it should go, and where it ended in f.
@@ -54,12 +55,18 @@ WORDS = {
     "end": "end of f",
 }
 # Pixels: the drawing's own width, the highest and the lowest map, and the margins.
-WIDTH, HIGHEST, LEAST_HIGH = 880.0, 620.0, 180.0
-LEFT, TOP, RIGHT, AXIS = 52.0, 10.0, 14.0, 46.0
+WIDTH = 880.0
+HIGHEST = 620.0
+LEAST_HIGH = 180.0
+LEFT = 52.0
+TOP = 10.0
+RIGHT = 14.0
+AXIS = 46.0
 # The minimum drawn along each axis, m.
 LEAST = 2.0
 # The maximum number of labels, and how many of the models drawn last they must not hide.
-MOST_LABELS, MOST_AVOIDED = 24, 1000
+MOST_LABELS = 24
+MOST_AVOIDED = 1000
 # The maximum number of points on a path.
 MOST_POINTS = 500
 # With more polygons in all, each model is drawn as one outline around it.
@@ -115,7 +122,8 @@ def _places(record: Record) -> dict[str, Point]:
     """Where the start, the goal and f's end are, x, y (m), if they are known and not far outside."""
     places: dict[str, Point] = {}
     if record.scenario is not None:
-        spawn, goal = record.scenario.robot.spawn, record.scenario.goal
+        spawn = record.scenario.robot.spawn
+        goal = record.scenario.goal
         places = {"start": (spawn.x, spawn.y), "goal": (goal.x, goal.y)}
     if record.state.f_position is not None:
         places["end"] = record.state.f_position[:2]

@@ -12,7 +12,8 @@ from ddenv.runfile.state import REFUSED, Round, RunState
 from ddenv.text import count, plain
 
 # Longer tables of rounds and of decisions show only the first and the last rows; of many rounds, only those that reduced.
-MOST_ROUNDS, MOST = 60, 120
+MOST_ROUNDS = 60
+MOST = 120
 
 
 def way(record: Record) -> Section | None:
@@ -28,7 +29,8 @@ def way(record: Record) -> Section | None:
 
 
 def _rounds(record: Record) -> list[Block]:
-    state, rounds = record.state, record.rounds
+    state = record.state
+    rounds = record.rounds
     tests = Counter(test.round for test in state.tests if test.phase == "round" and test.is_finished)
     explained = "A round tries one set of models after another; the first one that shows f becomes the environment."
     if any(_tried(each) and not tests[each.number] for each in rounds):

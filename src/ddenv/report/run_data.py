@@ -104,7 +104,8 @@ def read_run(path: Path) -> Record:
 
 def _story(file: RunFile) -> tuple[Recorded | None, RunState, tuple[Round, ...], str]:
     """The first event, the state at the end or before the first damaged event, every round as it ended, and what is wrong."""
-    first, state = None, RunState()
+    first = None
+    state = RunState()
     rounds: dict[int, Round] = {}
     trouble = ""
     try:

@@ -19,7 +19,10 @@ from ddenv.words.claims import rate
 from ddenv.words.margins import HEAD, rows, said
 
 # The maximum number of models in the table and with a sentence, of names in a list, of those that a removal drops, and of maps.
-MOST_MODELS, MOST_NAMES, MOST_DROPPED, MOST_MAPS = 200, 12, 3, 6
+MOST_MODELS = 200
+MOST_NAMES = 12
+MOST_DROPPED = 3
+MOST_MAPS = 6
 
 
 def what_is_left(record: Record) -> Section:
@@ -32,7 +35,8 @@ def what_is_left(record: Record) -> Section:
     left = say(Strong("Left:"), " ", *named(state.environment, MOST_MODELS), ".")
     none = "No map: the world cannot be read."
     if state.baseline is None:
-        title, words = "The world", "The world from above."
+        title = "The world"
+        words = "The world from above."
         left = say(f"{count(len(state.elements), 'model')} can be removed. {none}")
     if record.world is None:
         return Section(title, (left,) if state.baseline is None else (left, say(none)))
@@ -41,7 +45,8 @@ def what_is_left(record: Record) -> Section:
 
 
 def _models(record: Record) -> list[Block]:
-    state, names = record.state, record.state.environment[:MOST_MODELS]
+    state = record.state
+    names = record.state.environment[:MOST_MODELS]
     if not names:
         return []
     by_name = {each.model.name: each for each in record.models}
@@ -109,7 +114,8 @@ def margins(record: Record) -> Section | None:
 def _limits(record: Record) -> tuple[Block, Block]:
     """What is left with the outlines of all limits, and two ways of the smallest change to the goal that can be compared."""
     compared = [(one, one.parting) for one in record.changes if one.parting is not None]
-    words, ways = "How far each model may move before f disappears.", {}
+    words = "How far each model may move before f disappears."
+    ways = {}
     if compared:
         one, parting = min(compared, key=lambda each: (each[0].verdict != "goal", each[0].share))
         ways = {"now": record.ways[parting.with_test], "changed": record.ways[parting.without_test]}

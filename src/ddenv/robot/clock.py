@@ -38,7 +38,8 @@ class Clock:
 
     @classmethod
     def of(cls, scenario: Scenario) -> Clock:
-        sensors, step = scenario.sensors, scenario.simulation.time_step
+        sensors = scenario.sensors
+        step = scenario.simulation.time_step
         periods = {
             "record": RECORD_PERIOD,
             "command": scenario.controller.period,

@@ -162,7 +162,8 @@ class Guarded:
         return command
 
     def _guarded(self, what: str, call: Callable[[Any], Any], given: Any) -> Any:
-        who, limit = f"controller {self._name}: {what}", f"{self._seconds:g} s (controller.answer_within)"
+        who = f"controller {self._name}: {what}"
+        limit = f"{self._seconds:g} s (controller.answer_within)"
         with redirect_stdout(sys.stderr):
             return guarded(who, lambda: call_within(self._seconds, call, given), self._folder, limit)
 

@@ -60,7 +60,8 @@ def call_within(seconds: float, call: Callable[[Given], Answer], given: Given) -
 
 
 def _interrupted(seconds: float, call: Callable[[Given], Answer], given: Given) -> Answer:
-    alarms, most = 0, max(FEWEST, math.ceil(seconds / ALARM))
+    alarms = 0
+    most = max(FEWEST, math.ceil(seconds / ALARM))
 
     def count(number: int, frame: FrameType | None) -> None:
         nonlocal alarms

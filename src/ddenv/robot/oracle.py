@@ -16,12 +16,14 @@ LEAN = math.radians(60)  # a robot that leans more than this no longer stands on
 
 # Descending this far (m) within this time (s) is a fall: 1.7 m/s downwards is faster than wheels descend any slope on which they
 # have grip, and a free fall covers 1.8 m in that time.
-DROP, DROP_SECONDS = 1.0, 0.6
+DROP = 1.0
+DROP_SECONDS = 0.6
 SETTLING = 1.0  # a robot may drop onto the ground when a run begins, s
 
 # Within half a robot's length (m) of its end for this time (s). A moving robot leaves such a circle in a second or two; one that
 # rocks back and forth to get free stays.
-STILL, STILL_SECONDS = 0.5, 6.0
+STILL = 0.5
+STILL_SECONDS = 6.0
 
 
 def kind_of(trajectory: Floats, fell: bool, arrived: float | None) -> str:
@@ -36,13 +38,15 @@ def kind_of(trajectory: Floats, fell: bool, arrived: float | None) -> str:
     stuck        in the last 6 s (or the second half of a shorter run) never more than 0.5 m from its end
     out of time  still moving
     """
-    times, heights = trajectory[:, 0], trajectory[:, 3]
+    times = trajectory[:, 0]
+    heights = trajectory[:, 3]
     before = np.searchsorted(times, times - DROP_SECONDS - 1e-9)
     fallen = (heights[before] - heights > DROP) & (times[before] >= SETTLING) & (heights[before] - heights[-1] > DROP)
     if fell or fallen.any():
         return "fell"
     (w, x, y, z), (ew, ex, ey, ez) = (trajectory[row, 4:].tolist() for row in (0, -1))
-    start, end = Pose(quaternion=(w, x, y, z)), Pose(quaternion=(ew, ex, ey, ez))
+    start = Pose(quaternion=(w, x, y, z))
+    end = Pose(quaternion=(ew, ex, ey, ez))
     up = end.rotate(start.inverse().rotate((0.0, 0.0, 1.0)))
     if math.acos(max(-1.0, min(1.0, up[2]))) > LEAN:
         return "tipped over"

@@ -70,7 +70,8 @@ class Scan:
     def points(self) -> Floats:
         """Where beams hit something, shape (M, 3) m, in the frame of the robot's first link."""
         met = np.isfinite(self.ranges)
-        ranges, angles = self.ranges[met], self.angles[met]
+        ranges = self.ranges[met]
+        angles = self.angles[met]
         x, y, z = self.origin
         return np.column_stack([x + ranges * np.cos(angles), y + ranges * np.sin(angles), np.full(len(ranges), z)])
 

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 
 from ddenv.runfile.progress import Node, path
 
-HERE, MINIMAL, REJECTED, OTHER = "●", "◆", "✗", "○"
+HERE = "●"
+MINIMAL = "◆"
+REJECTED = "✗"
+OTHER = "○"
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,7 +44,8 @@ def apply(state: RunState, recorded: Recorded) -> RunState:
         if isinstance(event, e.CommandRefused):
             changes["refusal"] = recorded.command, event.why
     after = state.changed(revision=recorded.id, updated_at=recorded.time, **changes)
-    stood, stands = _stands(state), _stands(after)
+    stood = _stands(state)
+    stands = _stands(after)
     # The clock stops where the run stands still, and starts where it goes on.
     if stands and not stood:
         return after.changed(**_stopped(after, after.updated_at))
@@ -57,7 +58,8 @@ def steps(events: Iterable[Recorded], state: RunState | None = None) -> Iterator
     """(event, before, after) for each event, from the beginning or from an earlier `state`. Raises UserError at an invalid one."""
     after = state or RunState()
     for recorded in events:
-        before, after = after, apply(after, recorded)
+        before = after
+        after = apply(after, recorded)
         yield recorded, before, after
 
 
@@ -133,7 +135,8 @@ def engine_failed(state: RunState, event: e.EngineFailed, at: float) -> Changes:
 
 
 def finished(state: RunState, event: e.Finished, at: float) -> Changes:
-    size, here = len(state.environment), replace(state.nodes[state.node], minimal=event.minimal)
+    size = len(state.environment)
+    here = replace(state.nodes[state.node], minimal=event.minimal)
     point = Point(state.tests_done, size, min(size, state.lower_bound))
     # A run that is resumed at its end finishes again.
     history = state.history if state.history[-1] == point else (*state.history, point)
@@ -225,7 +228,8 @@ def forecast(state: RunState, event: e.Forecast, _: float) -> Changes:
     low, likely, high = event.tests
     if state.forecast is not None:
         done = event.tests_done - state.forecast.tests_done
-        low, high = max(low, state.forecast.tests[0] - done), min(high, state.forecast.tests[2] - done)
+        low = max(low, state.forecast.tests[0] - done)
+        high = min(high, state.forecast.tests[2] - done)
     return {"forecast": event if low > high else replace(event, tests=(low, min(max(low, likely), high), high))}
 
 
@@ -239,7 +243,8 @@ def candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Cha
     # Something in the part that it leaves out is needed, and these parts are disjoint.
     round: Round = changes["round"]
     round = replace(round, missed=round.missed + (candidate.kind == "complement" or len(round.partitions) == 2))
-    changes["round"], needed = round, min(max(state.lower_bound, round.missed, 1), len(round.environment))
+    changes["round"] = round
+    needed = min(max(state.lower_bound, round.missed, 1), len(round.environment))
     if needed != state.lower_bound:
         point = Point(state.tests_done, len(state.environment), needed)
         changes |= {"lower_bound": needed, "history": (*state.history, point)}
@@ -251,7 +256,8 @@ def waiting(state: RunState, event: e.Waiting, _: float) -> Changes:
 
 
 def decided(state: RunState, event: e.Decided, at: float) -> Changes:
-    candidate, accepts = tried(state, event), event.decision == "accept"
+    candidate = tried(state, event)
+    accepts = event.decision == "accept"
     words = f"{'accepted' if accepts else 'rejected'} {_described(state, candidate)}"
     status = "paused" if state.paused else "running"
     changes = {"status": status, "waiting_candidate": None, **decision(state, at, event.decision, words)}
@@ -262,7 +268,8 @@ def decided(state: RunState, event: e.Decided, at: float) -> Changes:
 
 
 def reduced(state: RunState, event: e.Reduced, at: float) -> Changes:
-    winner, round = tried(state, event), current(state)
+    winner = tried(state, event)
+    round = current(state)
     # One part alone shows f although several seemed to be needed: the lower bound was wrong.
     if winner.kind == "partition" and round.missed > 1:
         state = state.changed(lower_bound=0)
@@ -274,9 +281,11 @@ def round_finished(state: RunState, event: e.RoundFinished, _: float) -> Changes
     round = current(state)
     changes: Changes = {"round": replace(round, done=True), "rounds_done": round.number}
     if state.leg is not None:
-        last, evidence = len(round.candidates), None
+        last = len(round.candidates)
+        evidence = None
         if round.winner is not None:
-            last, evidence = round.winner + 1, state.evidence_test
+            last = round.winner + 1
+            evidence = state.evidence_test
         judged = [one for one in round.candidates[:last] if one.verdict in JUDGED]
         tests = tuple(dict.fromkeys(test for one in judged for test in one.tests))
         unknown = tuple(one.index for one in judged if one.verdict == "unknown")
@@ -304,7 +313,8 @@ def vetoed(state: RunState, event: e.Vetoed, at: float) -> Changes:
 
 
 def unvetoed(state: RunState, event: e.Unvetoed, at: float) -> Changes:
-    candidate, round = tried(state, event), current(state)
+    candidate = tried(state, event)
+    round = current(state)
     known = next((one for one in state.refused if one.environment == candidate.kept), None)
     changes = {
         **with_candidate(state, replace(candidate, verdict="")),

@@ -53,7 +53,8 @@ def _check_tests(state: RunState, tests: Sequence[int]) -> None:
 def rate_lost(state: RunState, event: e.RateLost, _: float) -> Changes:
     """What is left shows f too rarely: the run goes back to the last environment not shown to."""
     _check_tests(state, event.tests)
-    node, lost = state.nodes[event.node], state.nodes[event.lost]
+    node = state.nodes[event.node]
+    lost = state.nodes[event.lost]
     if any(model >= len(state.elements) for group in event.again for model in group):
         raise ValueError(event.again)
     return {
@@ -69,7 +70,8 @@ def rate_lost(state: RunState, event: e.RateLost, _: float) -> Changes:
 def left_out(state: RunState, event: e.LeftOut, at: float) -> Changes:
     without = state.elements[event.without]
     runs = [test.id for test in state.confirm_tests if test.environment == event.environment]
-    what, how = f"without {listed([without])}", "left_out" if event.by_user else "certified"
+    what = f"without {listed([without])}"
+    how = "left_out" if event.by_user else "certified"
     said = decision(state, at, "leave_out", f"left out {listed([without])}, which only helped") if event.by_user else {}
     return arrived(state, event.environment, event.evidence_test, at, how, what, runs) | said
 
@@ -170,7 +172,8 @@ def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes
 
     The results of all implied tests are void. The run goes back to the last environment that rests on none.
     """
-    audit, node = state.test(event.test), state.nodes[event.node]
+    audit = state.test(event.test)
+    node = state.nodes[event.node]
     path = state.changed(node=node.number).path
     if audit.audits != event.by or any(rests_on_slices(state, earlier) for earlier in path):
         raise ValueError(event.by)

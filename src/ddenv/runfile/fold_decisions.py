@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from ddenv.runfile import events as e
 
 # Maximum number of models that a decision names, and maximum length of a name.
-NAMED, LONGEST = 3, 40
+NAMED = 3
+LONGEST = 40
 
 
 def pinned(state: RunState, event: e.Pinned, at: float) -> Changes:
@@ -105,11 +106,13 @@ def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
     }
     state = state.changed(**changes)
     nodes = with_node(state.nodes, replace(node, rejected=False, lost_rate=False))
-    kind, words = "go_back", f"went to {place(node)}"
+    kind = "go_back"
+    words = f"went to {place(node)}"
     if event.rejected is not None:
         last = nodes[event.rejected]
         nodes = with_node(nodes, replace(last, rejected=True))
-        kind, words = "undo", f"took back {last.what}: {count(len(node.environment), 'model')} again"
+        kind = "undo"
+        words = f"took back {last.what}: {count(len(node.environment), 'model')} again"
         changes |= refused(state, state.environments[last.id], "undone", None)
     gone = state.pinned.difference(node.environment)
     words += _unpinned(state, gone)
@@ -243,7 +246,8 @@ def refused(state: RunState, environment: Environment, verdict: str, round: int 
 
 def failures_at(state: RunState, number: int) -> Numbers:
     """The tests whose failures count as f in a node: that of f in its branch, and those accepted on the way from there."""
-    way, first = path(state.nodes, number), origin(state, number)
+    way = path(state.nodes, number)
+    first = origin(state, number)
     counted = (node for node in way[way.index(first) :] if node is first or node.how == "accepted")
     return tuple(node.evidence_test for node in counted if node.evidence_test is not None)
 
@@ -256,7 +260,8 @@ def origin(state: RunState, number: int) -> Node:
 
 def exact_runs(state: RunState) -> Numbers:
     """The runs that `accept_rate: exact` reduces: the first ones that showed f where it was seen. None with other rules."""
-    asked, whole = settings(state), origin(state, state.node).id
+    asked = settings(state)
+    whole = origin(state, state.node).id
     if asked.accept_rate != "exact":
         return ()
     tests = (test for test in rested_on(state) if test.environment == whole and test.shows_f)

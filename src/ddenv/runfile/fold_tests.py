@@ -22,9 +22,12 @@ END = ("outcome", "failure", "distance", "end_pose", "simulated_seconds", "cut",
 
 
 def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) -> Changes:
-    removals, removal, node = state.removals, None, state.node
+    removals = state.removals
+    removal = None
+    node = state.node
     if event.phase == ISOLATE:
-        (removals, removal), node = with_removal(state, event.environment), 0
+        (removals, removal) = with_removal(state, event.environment)
+        node = 0
     elif event.phase == CERTIFY and event.without is None:
         # Of a fresh run, that with its environment on the way to the current one.
         node = next((one.number for one in reversed(state.path) if one.id == event.environment), node)
@@ -91,7 +94,8 @@ def implied(state: RunState, event: e.Implied, at: float) -> Changes:
     """A test that starts and ends at once: it has the result of another one."""
     started = test_started(state, event, at)
     now = state.changed(**started)
-    test, made = now.tests[-1], now.test(event.by)
+    test = now.tests[-1]
+    made = now.test(event.by)
     if not made.is_sound or made.implied_by is not None or made.run != test.run:
         raise ValueError(event.by)
     there = frozenset(now.models_of(test))
@@ -110,7 +114,8 @@ def test_lost(state: RunState, event: e.TestLost, _: float) -> Changes:
 
 
 def baseline_finished(state: RunState, event: e.BaselineFinished, _: float) -> Changes:
-    changes, first = with_outcomes(state, event.judged), event.failure_test
+    changes = with_outcomes(state, event.judged)
+    first = event.failure_test
     judged = state.changed(**changes)
     rated = (test.id for test in judged.tests if test.phase == "baseline" and test.run >= event.chose)
     runs, shown = seen(judged.tests, rated)
@@ -163,7 +168,8 @@ def rested_upon(before: RunState, event: e.Event) -> Changes:
 def _noted(state: RunState, test: Test) -> Changes:
     """The nodes, with a finished test entered where it ran the whole environment of one."""
     node: Node | None = None
-    round, here = state.round, state.here
+    round = state.round
+    here = state.here
     if test.phase == CERTIFY:
         # Beside what is left, the whole world runs where that missed f, which would show its rate as too low.
         beside = test.node != state.node and state.nodes[test.node].how in ("start", "instead")

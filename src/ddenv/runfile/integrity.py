@@ -45,7 +45,10 @@ def faults(file: RunFile) -> list[str]:
 
 def whole(file: RunFile, keep: Callable[[Recorded], None] = lambda _: None) -> Whole:
     """How much of the run can be used. Calls `keep` with each event that makes sense, up to the first one that does not."""
-    state, count, bare, trouble = RunState(), 0, 0, ""
+    state = RunState()
+    count = 0
+    bare = 0
+    trouble = ""
     try:
         for event in file.read():
             state = apply(state, event)
@@ -68,7 +71,8 @@ def rescue(file: RunFile, copy: Path) -> Whole:
     if copy.exists():
         raise UserError(f"{copy}: exists already; choose another name for the copy")
     try:
-        first, documents = next(file.read(most=1), None), file.documents("")
+        first = next(file.read(most=1), None)
+        documents = file.documents("")
     except UserError:
         first = None
     if first is None or not isinstance(first.event, Created):

@@ -29,10 +29,8 @@ def _lock_path(run: Path) -> Path:
 def engine_lock(run: Path, taken: str = "") -> Iterator[None]:
     """Holds the run's lock. Raises UserError, with the words `taken` if there are any, if another engine holds it."""
     taken = taken or f"{run}: another engine is working on this run; attach to it with 'ddenv open {run}'"
-    refused, instead = (
-        f"{run}: cannot run an engine here",
-        "copy the run to a folder on this machine that you can write to",
-    )
+    refused = f"{run}: cannot run an engine here"
+    instead = "copy the run to a folder on this machine that you can write to"
     with held(_lock_path(run), taken, refused, instead, mode_beside(run)):
         yield
 

@@ -100,7 +100,9 @@ class Position:
             self.note(event.kind, before, after)
 
     def _add_to_chapter(self, kind: str, before: RunState, after: RunState) -> None:
-        id, models, last = after.revision, len(after.environment), self.chapters[-1] if self.chapters else None
+        id = after.revision
+        models = len(after.environment)
+        last = self.chapters[-1] if self.chapters else None
         begun = id, id, models, models, after.tests_done
         if kind == "round_started" and after.round is not None:
             self.chapters.append(Chapter("round", after.round.number, *begun))
@@ -145,7 +147,8 @@ class Position:
             return None
         wanted = self._ids[place]
         if not (self._near and self._near[0].recorded.id <= wanted <= self._near[-1].recorded.id):
-            kept, end = self._kept[(place - 1) // GAP], self._ids[-1]
+            kept = self._kept[(place - 1) // GAP]
+            end = self._ids[-1]
             noted = takewhile(lambda event: event.id <= end, self._read(kept.revision, GAP))
             self._near = [Moment(*step) for step in steps(noted, kept)]
         return self._near[bisect_right(self._near, wanted, key=lambda each: each.recorded.id) - 1]
@@ -164,7 +167,8 @@ class Position:
         stops = self.stops(what)
         here = self._ids[-1] if self.at is None else self.at
         if by > 0:
-            place, is_end = bisect_right(stops, here), self.at is None
+            place = bisect_right(stops, here)
+            is_end = self.at is None
             self.go(stops[place] if place < len(stops) else None)
             return not is_end
         place = bisect_left(stops, here) - 1

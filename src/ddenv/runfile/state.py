@@ -48,7 +48,8 @@ class PersistentTuple(Sequence[Item]):
         """One with `item` at `index`, which may be negative. Raises IndexError if there is no such index."""
         number, place = divmod(range(len(self))[index], CHUNK)
         # Joined slices would be copied twice.
-        chunk, chunks = list(self.chunks[number]), list(self.chunks)
+        chunk = list(self.chunks[number])
+        chunks = list(self.chunks)
         chunk[place] = item
         chunks[number] = tuple(chunk)
         return PersistentTuple(tuple(chunks))
@@ -94,9 +95,11 @@ REFUSED = ("vetoed", "rejected", "undone")
 UNFINISHED = ("running", "lost")
 _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
 # The phase of full runs of what is left with fresh seeds, and of runs of the whole world without the models of a removal.
-CERTIFY, ISOLATE = "certify", "isolate"
+CERTIFY = "certify"
+ISOLATE = "isolate"
 # The first run with a fresh seed; the search never comes so far. A certificate has so many seeds, or more if it is asked for more.
-FIRST_FRESH_RUN, FRESH_RUNS = 10_000, 1000
+FIRST_FRESH_RUN = 10_000
+FRESH_RUNS = 1000
 
 
 @dataclass(frozen=True)
@@ -232,7 +235,8 @@ class RunState:
     @property
     def f_position(self) -> Place | None:
         """Where the robot ended in f, x, y, z m; None until f is fixed."""
-        base, test = self.baseline, self.f_test
+        base = self.baseline
+        test = self.f_test
         if base is None or test is None or test.id == base.failure_test or test.end_pose is None:
             return None if base is None else base.position
         x, y, z = test.end_pose[:3]
@@ -426,7 +430,8 @@ class Candidate:
     @property
     def size(self) -> int:
         """How many models it has."""
-        split, part = self.split, len(self.split.partitions[self.partition])
+        split = self.split
+        part = len(self.split.partitions[self.partition])
         return part + len(split.pinned) if self.kind == "partition" else len(split.environment) - part
 
     @property

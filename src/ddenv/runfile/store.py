@@ -30,12 +30,14 @@ if TYPE_CHECKING:
 
 APPLICATION_ID = 0x64644531
 # The format of the file. Those before the oldest one are refused; 8 has the bounds of certificates.
-SCHEMA_VERSION, OLDEST_VERSION = 8, 7
+SCHEMA_VERSION = 8
+OLDEST_VERSION = 7
 # The maximum time, Unix time in s: the year 5138.
 LATEST = 1e11
 COLUMNS = 8  # time s, x, y, z m, quaternion w, x, y, z
 # Maximum wait for another process to finish writing, s: a screen must not freeze, an engine must not give up.
-VIEWER_WAIT, ENGINE_WAIT = 1.0, 30.0
+VIEWER_WAIT = 1.0
+ENGINE_WAIT = 30.0
 
 _SCHEMA = """
 CREATE TABLE document (name TEXT PRIMARY KEY, content BLOB NOT NULL) WITHOUT ROWID;
@@ -287,7 +289,8 @@ class RunFile:
         """Prepares for writing: readers are never blocked, and a killed engine loses no committed event. Where the disk has no room
         for an event, `wait` is called; it returns whether to try again.
         """
-        self._owned, self._wait = _identity(self.path), wait
+        self._owned = _identity(self.path)
+        self._wait = wait
         self._db.execute(f"PRAGMA busy_timeout = {ENGINE_WAIT * 1000:.0f}")
         with self._writing() as db:
             db.execute("DELETE FROM live")

@@ -42,7 +42,8 @@ def dropped(supports: Pairs, keep: Iterable[str], environment: Iterable[str]) ->
     What is not in the `environment` was removed before: what rested on it has fallen already.
     """
     keep = tuple(keep)
-    kept, there = frozenset(keep), frozenset(environment)
+    kept = frozenset(keep)
+    there = frozenset(environment)
     held = [(upper, lower) for upper, lower in supports if upper in kept and lower not in kept]
     new = falling = {upper for upper, lower in held if lower in there or upper not in there}
     while new:

@@ -64,7 +64,8 @@ def told(moment: Moment) -> Test | None:
     """The test whose end a moment tells: the one that ended in it, or the last one of a candidate that was judged."""
     from ddenv.runfile.events import CandidateJudged, Implied, TestFinished
 
-    state, event = moment.after, moment.recorded.event
+    state = moment.after
+    event = moment.recorded.event
     if isinstance(event, TestFinished | Implied):
         return state.test(event.test)
     row = pointed(moment) if isinstance(event, CandidateJudged) else None
@@ -75,7 +76,8 @@ def pointed(moment: Moment) -> Candidate | None:
     """The candidate that a moment is about; None if it is about none."""
     from ddenv.runfile.events import Implied, OfCandidate, TestFinished, TestLost, TestStarted
 
-    state, event = moment.after, moment.recorded.event
+    state = moment.after
+    event = moment.recorded.event
     if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
         row = made_for(state, state.test(event.test))
         return row if isinstance(row, Candidate) else None

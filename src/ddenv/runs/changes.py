@@ -44,7 +44,8 @@ def changes(file: RunFile, state: RunState, world: World | None) -> tuple[Change
     by_name = {} if world is None else {model.name: model for model in world.models}
     found = []
     for row in rows(margins):
-        one, asked = row.margin, row.margin.asked
+        one = row.margin
+        asked = row.margin.asked
         ends = [value for side in one.sides for value in (side.goal, side.gone) if value and value.outcomes]
         if not ends:
             continue
@@ -83,7 +84,8 @@ def changed_run(state: RunState, number: int) -> tuple[MarginRan, Test]:
 
 
 def _parting(file: RunFile, state: RunState, name: str, value: float) -> Parting | None:
-    left, margins = beside(state), state.margins
+    left = beside(state)
+    margins = state.margins
     if left is None or margins is None:
         return None
     for place, one in enumerate(margins.runs):

@@ -16,7 +16,8 @@ from ddenv.world.extent import model_bounds
 from ddenv.world.model import Model, World
 
 # The maximum number of models to name, and the width of a value.
-MOST_COMPARED, LONGEST = 20, 60
+MOST_COMPARED = 20
+LONGEST = 60
 NONE = "none"
 # What a screen shows elsewhere, or what every run has its own of.
 ASIDE = ("name", "description", "folder")
@@ -51,7 +52,8 @@ def compared(first: Recent, second: Recent) -> Iterator[Difference]:
 def differences(first: Mapping[str, Any], second: Mapping[str, Any], above: str = "") -> Iterator[Difference]:
     """The settings in which two scenarios differ, by their paths such as `reduction.iterations`."""
     for key in dict.fromkeys((*first, *second)):
-        one, other = first.get(key), second.get(key)
+        one = first.get(key)
+        other = second.get(key)
         if key in FILES:
             one, other = (PurePath(each).name if isinstance(each, str) else each for each in (one, other))
         if one == other or (not above and key in ASIDE):

@@ -85,7 +85,9 @@ def create_inside(run: Path, path: Path) -> World:
     """
     with RunFile(run) as file:
         scenario, whole, robot = read_parts(file)
-        state, documents, stored = fold(file.events()), file.documents(""), Resources(file.documents(RESOURCE))
+        state = fold(file.events())
+        documents = file.documents("")
+        stored = Resources(file.documents(RESOURCE))
     if scenario.reading.inside:
         raise UserError(f"{run}: is a reduction inside models already")
     removed = frozenset(state.elements) - frozenset(state.environment)

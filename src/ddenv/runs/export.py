@@ -45,8 +45,11 @@ def export_world(
     """
     with RunFile(run) as file:
         subject = read_subject(file)
-        robot, documents = file.document("robot"), file.documents(RESOURCE)
-    scenario, world, state = subject.scenario, subject.world, subject.state
+        robot = file.document("robot")
+        documents = file.documents(RESOURCE)
+    scenario = subject.scenario
+    world = subject.world
+    state = subject.state
     assert state is not None
     check_ending(sdf, scenario.world)
     if not state.elements:
@@ -55,7 +58,8 @@ def export_world(
     there = with_margins(subject, margins)
     if scenario_file is None and there.scenario != scenario:
         raise UserError("--margin: this is a number of the scenario, not of the world: also give --scenario FILE")
-    scenario, world = there.scenario, there.world
+    scenario = there.scenario
+    world = there.world
     try:
         text = without(world, removed)
     except ValueError as error:
@@ -72,11 +76,13 @@ def export_world(
     write_file(model, robot)
     folder = scenario_file.parent.resolve()
     data = keys_in(folder, scenario)
-    data["world"], data["robot"]["model"] = _name(sdf, folder), _name(model, folder)
+    data["world"] = _name(sdf, folder)
+    data["robot"]["model"] = _name(model, folder)
     data["whole"] = whole_of(world, scenario).model_dump(mode="json")
     data["protected"] = renamed(scenario.protected, world, removed, minimal)
     # Those folders of the original world and robot that the exported files still need, and the robot's packages.
-    own, asked_by_robot = scenario.robot.model, Resources(documents)
+    own = scenario.robot.model
+    asked_by_robot = Resources(documents)
     parse_model(robot, own, scenario.reading, asked_by_robot)
     both = ((scenario.world.parent, asked), (own.parent, asked_by_robot))
     needed = [each for each, by in both if any(_leans_on(each, uri, base) for uri, base in by.asked)]
@@ -91,7 +97,9 @@ def export_world(
 
 def with_margins(subject: Subject, margins: Sequence[str]) -> Subject:
     """A run's world and scenario with the changes that `margins`, each NAME or NAME=VALUE, mean. Raises UserError."""
-    scenario, world, state = subject.scenario, subject.world, subject.state
+    scenario = subject.scenario
+    world = subject.world
+    state = subject.state
     for margin in margins:
         if subject.run is None or state is None:
             raise UserError("--margin: needs a run; a scenario has no margins yet")
@@ -134,7 +142,8 @@ def keys_in(folder: Path, scenario: Scenario) -> Data:
         data["folder"] = _name(scenario.folder, folder)
     if scenario.oracle is not None and scenario.oracle.folder is not None:
         data["oracle"]["folder"] = _name(scenario.oracle.folder, folder)
-    data["world"], data["robot"]["model"] = _name(scenario.world, folder), _name(scenario.robot.model, folder)
+    data["world"] = _name(scenario.world, folder)
+    data["robot"]["model"] = _name(scenario.robot.model, folder)
     data["reading"]["model_path"] = [_name(each, folder) for each in scenario.reading.model_path]
     return data
 

@@ -20,7 +20,8 @@ from ddenv.world.pose import Pose, pose_at
 # Time between two frames: a run file has a row of each motion so often, s.
 FRAME = 0.1
 # No test lasts longer, s, and nothing goes farther in one, m.
-LONGEST, FARTHEST = 1e6, 1e6
+LONGEST = 1e6
+FARTHEST = 1e6
 
 ANOTHER_SIMULATOR = "Another simulator made this run: only the robot's path is stored; models stay where they start."
 
@@ -73,7 +74,8 @@ def played(file: RunFile, position: Position, number: int) -> Played:
         words = purpose(position.end if start is None else start.after, test)
     except UserError:
         words = f"test {number}"
-    rows, moving = array("d"), {}
+    rows = array("d")
+    moving = {}
     for name, samples in _stored(file, number, lacks).items():
         stored = table(samples)
         times = stored[:, 0]

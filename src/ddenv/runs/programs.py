@@ -98,7 +98,8 @@ def last_words(run: Path) -> str:
     said = crashed = ""
     for line in log.read_text(errors="replace").splitlines() if log.exists() else []:
         if line.startswith(ENGINE_SAYS):
-            said, crashed = line.removeprefix(ENGINE_SAYS).strip(), ""
+            said = line.removeprefix(ENGINE_SAYS).strip()
+            crashed = ""
         elif PYTHON_SAYS.match(line):
             crashed = f": {line.strip()}"
     if said and said != ENGINE_STARTED:
@@ -118,7 +119,8 @@ def start_scene(run: Path) -> subprocess.Popen[str]:
         # A run in a folder that cannot be written can be seen all the same.
         log = Path(os.devnull).open("wb")  # noqa: SIM115  (closed below)
     with log:
-        words, pipe = [sys.executable, "-m", "ddenv.scene", str(run)], subprocess.PIPE
+        words = [sys.executable, "-m", "ddenv.scene", str(run)]
+        pipe = subprocess.PIPE
         return subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=log, text=True, start_new_session=True)
 
 

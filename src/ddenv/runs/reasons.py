@@ -22,7 +22,8 @@ from ddenv.words.claims import of_passing, uncertified, verdict_on
 from ddenv.world.pose import Point
 
 # What a run shows, beside f ("similar"): the robot reached its goal, or it failed otherwise.
-F, GOAL = "similar", "pass"
+F = "similar"
+GOAL = "pass"
 # What the robot does, by the `failure` of a run.
 DOES = {
     "stuck": "gets stuck",
@@ -151,9 +152,11 @@ def parting_of(file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str
 
 def parted(first: array[float], second: array[float]) -> tuple[float, float | None, Point | None]:
     """Until when two trajectories (flat rows of `COLUMNS`) are equal, s; when and where the second is `APART` from the first."""
-    equal, same = 0.0, True
+    equal = 0.0
+    same = True
     for row in range(0, min(len(first), len(second)), COLUMNS):
-        one, other = first[row : row + COLUMNS], second[row : row + COLUMNS]
+        one = first[row : row + COLUMNS]
+        other = second[row : row + COLUMNS]
         same = same and one == other
         if same:
             equal = one[0]
@@ -245,7 +248,8 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
     one = state.isolated
     if one is None:
         return None
-    words, shown = of_passing(state, one), is_nearest(one)
+    words = of_passing(state, one)
+    shown = is_nearest(one)
     if one.found is None:
         return Nearest((), words, shown)
     gone = state.removals[one.found - 1].models

@@ -41,7 +41,8 @@ RESOURCE = "resource "
 # The options on how a world is read.
 READING = ("model_path", "stand_in", "ignore", "inside", "mesh")
 # Maximum number of remembered remedies that a line names, and the maximum width of each in cells.
-NAMED, LONGEST = 3, 60
+NAMED = 3
+LONGEST = 60
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,8 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
     reads_remembered = others.pop("remembered", False)
     fetch: Fetch | None = others.pop("fetch", None)
     reading = {option: others.pop(option) for option in READING if option in others}
-    spawn, goal = given["spawn"], given["goal"]
+    spawn = given["spawn"]
+    goal = given["goal"]
     if not is_read_as_world(Path(name)):
         scenario = load_scenario(find_scenario(name))
     elif spawn is None or goal is None:
@@ -160,7 +162,9 @@ def with_remembered(world: Path, reading: Reading, announce: Announce | None = N
 
     Whatever else is wrong with the world shows when it is read.
     """
-    known, found, read_as = remembered(), dict[str, str](), reading
+    known = remembered()
+    found = dict[str, str]()
+    read_as = reading
     while known:
         read_as = reading_of(reading, **with_remedies({}, found))
         try:
@@ -184,7 +188,8 @@ def without_guesses_at_start(scenario: Scenario, announce: Announce | None = Non
 
     Raises UserError.
     """
-    reading, left_out = scenario.reading, list[str]()
+    reading = scenario.reading
+    left_out = list[str]()
     if AUTO not in reading.stand_ins.values():
         return scenario
     robot = read_model(scenario.robot.model, reading)
@@ -272,7 +277,8 @@ def load_parts(scenario: Scenario) -> tuple[World, Model]:
     """
     if scenario.oracle is not None:
         command_words(scenario)
-    reading, robot_file = scenario.reading, scenario.robot.model
+    reading = scenario.reading
+    robot_file = scenario.robot.model
     world = read_world(scenario.world, reading)
     around_robot = disk_of(robot_file, reading)
     robot = parse_model(read_bytes(robot_file), robot_file, reading, around_robot)

@@ -18,7 +18,8 @@ from ddenv.settings import Reduction
 from ddenv.text import Sentences, about, count, rounded
 
 # The latest tests show how long one takes. Workers wait for each other for some of the time.
-LATEST, BUSY = 50, 0.9
+LATEST = 50
+BUSY = 0.9
 # Tests of n models without re-runs are about factor * n ** power: fitted to random worlds of 5 to 5000 models.
 SCALE = {
     "ddenv": (6.5, 0.32),
@@ -31,11 +32,14 @@ SCALE = {
 LATE = 3
 # Most candidates do not show f, and get all their re-runs.
 # Eight of ten random worlds took between `FEWER` and `MORE` times as many tests.
-RERUN, FEWER, MORE = 0.75, 0.35, 2.3
+RERUN = 0.75
+FEWER = 0.35
+MORE = 2.3
 # Where f nearly always shows, so many runs without it make a candidate dissimilar, if the rate is to be kept.
 FEWEST_MISSES = 2
 # Tests of a search that keeps the rate grow with this power of 1 / rate: 70, 117, 237 and 342 for rates of 1, .8, .5 and .32.
-RARER, LEAST_RATE = 1.5, 0.02
+RARER = 1.5
+LEAST_RATE = 0.02
 # How many models are left, if nothing is known.
 SURVIVORS = 3
 # How many models took part in the baseline: in the ditch 5 of 43, in friction 20 of 25, in the rubble 27 to 34 of 36, among 5,000
@@ -87,7 +91,8 @@ def left_said(state: RunState, at_work: bool) -> Sentences:
 
 def _is_overdue(state: RunState) -> bool:
     """Whether the search, or the certificate, takes more tests than were foretold."""
-    forecast, now = state.forecast, in_the_making(state)
+    forecast = state.forecast
+    now = in_the_making(state)
     if state.ended:
         return False
     if now is not None:
@@ -98,7 +103,8 @@ def _is_overdue(state: RunState) -> bool:
 
 def _expected(state: RunState) -> Expected | None:
     """How many tests are left, as (low, likely, high); None if unknown."""
-    forecast, baseline = state.forecast, state.baseline
+    forecast = state.forecast
+    baseline = state.baseline
     if state.isolating is not None or state.margining is not None:
         return None
     if state.confirming:
@@ -166,7 +172,8 @@ def rough_run(models: int, asked: Reduction, rate: float | None = None, slices: 
     # Assumed without a word of earlier runs, the rate is taken as it is.
     seen = asked.baseline_runs
     if rate is None:
-        rate, seen = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1), 0
+        rate = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1)
+        seen = 0
     few, usual, many = (search_tests(each, asked, rate) for each in searched)
     certificate = certificate_tests(rate, asked.certify_rate, min(models, SURVIVORS), asked.baseline_runs, seen)
     if asked.accept_rate == "exact":

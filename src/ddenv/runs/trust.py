@@ -72,9 +72,14 @@ def _cluster_of(scenario: Scenario) -> list[Program]:
 
 def _own_program(scenario: Scenario) -> list[Program]:
     """Its simulator or its controller, if it brings one, with the files that its command names, or its class's module."""
-    oracle, what, use, folder = scenario.oracle, "controller", scenario.controller.use, scenario.folder.absolute()
+    oracle = scenario.oracle
+    what = "controller"
+    use = scenario.controller.use
+    folder = scenario.folder.absolute()
     if oracle is not None:
-        what, use, folder = "simulator", oracle.program, start_folder(scenario).absolute()
+        what = "simulator"
+        use = oracle.program
+        folder = start_folder(scenario).absolute()
         if oracle.command is not None:
             words = list[str]()
             with suppress(ValueError):

@@ -11,7 +11,8 @@ from ddenv.scene.stage import DRAWN, Stage
 from ddenv.world.pose import Pose, Vector, vector
 
 # A robot whose start and goal are nearer to each other than this, m, is small itself, as the hand of an arm is.
-NEAR, SMALLEST = 1.5, 0.1
+NEAR = 1.5
+SMALLEST = 0.1
 FIELD_OF_VIEW = 38.0  # vertical, degrees
 ELEVATION = 32.0  # of the camera above the horizon, degrees
 ASIDE = 20.0  # rotation of the camera from perpendicular to the path towards the start, degrees
@@ -35,7 +36,8 @@ def scale_of(start: Vector, goal: Vector) -> float:
 
 def view(start: Vector, goal: Vector) -> View:
     """The view of a robot that moves from `start` to `goal`."""
-    dx, dy = goal[0] - start[0], goal[1] - start[1]
+    dx = goal[0] - start[0]
+    dy = goal[1] - start[1]
     scale = scale_of(start, goal)
     radius = max(2.5 * scale, 0.5 * math.hypot(dx, dy) + 1.8 * scale)
     along = math.atan2(dy, dx)

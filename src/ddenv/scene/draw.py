@@ -18,15 +18,22 @@ from ddenv.world.model import Model, Plane, World, is_ground, jointed_links
 from ddenv.world.pose import Pose, Vector
 
 WORLD: Path = ("world",)
-MODELS, LEFT_OUT, REMOVED = (*WORLD, "models"), (*WORLD, "left-out"), (*WORLD, "removed")
-ROBOT, EVIDENCE, TRAIL = (*WORLD, "robot"), (*WORLD, "trajectory-of-f"), (*WORLD, "trail")
+MODELS = (*WORLD, "models")
+LEFT_OUT = (*WORLD, "left-out")
+REMOVED = (*WORLD, "removed")
+ROBOT = (*WORLD, "robot")
+EVIDENCE = (*WORLD, "trajectory-of-f")
+TRAIL = (*WORLD, "trail")
 # The robot of a second run, its path, and where the two runs part.
-GHOST, GHOST_TRAIL, PARTING = (*WORLD, "ghost"), (*WORLD, "ghost-trail"), (*WORLD, "parting")
+GHOST = (*WORLD, "ghost")
+GHOST_TRAIL = (*WORLD, "ghost-trail")
+PARTING = (*WORLD, "parting")
 PARTS: Path = (*WORLD, "parts")
 MOST_LETTERS = 200  # of partitions
 # Points in one piece of a growing trail: only the last piece is sent again.
 PIECE = 24
-GROUND_SIZE, GRID_SIZE = 240.0, 60.0  # m
+GROUND_SIZE = 240.0
+GRID_SIZE = 60.0  # m
 STEEP = 1e-6  # a plane whose unit normal has a smaller z is vertical
 LINE = 0.025  # radius of drawn trajectories, m
 ABOVE = 0.05  # height of drawn trajectories above the robot's lowest point, m
@@ -147,10 +154,13 @@ class Scenery:
         They stand over the models where these start; the browser lets the letters and edges of models that can move follow them.
         """
         self._stage.delete(PARTS)
-        places, edges = list[Letter](), dict[Color, list[np.ndarray]]()
+        places = list[Letter]()
+        edges = dict[Color, list[np.ndarray]]()
         for letter, color, names in groups:
             for name, (low, high) in [(name, box) for name in names if (box := self._boxes.get(name)) is not None]:
-                ends, (x, y), listed = edges_of(low, high), ((low + high) / 2)[:2], len(places) < MOST_LETTERS
+                ends = edges_of(low, high)
+                (x, y) = ((low + high) / 2)[:2]
+                listed = len(places) < MOST_LETTERS
                 key = self.keys.get(name, "") if listed else ""
                 if key:
                     self._stage.draw((*PARTS, key), lines(ends, color), shadow=False)
@@ -200,7 +210,8 @@ class Scenery:
         links = jointed_links(model)
         pieces = {} if links else {key: painted}
         for count, (name, link) in enumerate(links.items()):
-            self._first[name], self.movers[name] = link.pose, f"{key}/link {count}"
+            self._first[name] = link.pose
+            self.movers[name] = f"{key}/link {count}"
             pieces[self.movers[name]] = paint(replace(model, links=(link,)))
         for place, items in pieces.items():
             for part, item in enumerate(items):

@@ -115,7 +115,8 @@ def revolved(*profiles: Sequence[Point], sides: int = SIDES) -> Surface:
 
 def frustum(bottom: float, top: float, length: float) -> Surface:
     """A truncated cone along z, centred on its frame's origin, with radii `bottom` and `top`."""
-    low, high = (bottom, -length / 2), (top, length / 2)
+    low = (bottom, -length / 2)
+    high = (top, length / 2)
     return revolved([(0.0, length / 2), high], [high, low], [low, (0.0, -length / 2)])
 
 
@@ -126,7 +127,8 @@ def sphere(radius: float) -> Surface:
 
 def capsule(radius: float, length: float) -> Surface:
     """A cylinder of `length` along z, centred on its frame's origin, with a hemisphere on each end."""
-    top, bottom = _arc(radius, 0.0, math.pi / 2, SIDES // 4), _arc(radius, math.pi / 2, math.pi, SIDES // 4)
+    top = _arc(radius, 0.0, math.pi / 2, SIDES // 4)
+    bottom = _arc(radius, math.pi / 2, math.pi, SIDES // 4)
     return revolved([*((r, z + length / 2) for r, z in top), *((r, z - length / 2) for r, z in bottom)])
 
 
@@ -145,7 +147,8 @@ def creased(mesh: Mesh) -> Surface:
     """The surface of a mesh, smooth where it bends little, with sharp edges elsewhere."""
     corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat, count = mesh.faces.ravel(), len(mesh.vertices)
+    flat = mesh.faces.ravel()
+    count = len(mesh.vertices)
     weights = np.repeat(normals, 3, axis=0)
     common = np.column_stack([np.bincount(flat, weights[:, axis], count) for axis in range(3)])[mesh.faces]
     along = np.einsum("fi,fci->fc", normals, common)
@@ -209,11 +212,14 @@ def height_at(surface: Surface, x: float, y: float) -> float | None:
         return product
 
     origin, second, third = np.moveaxis(surface.triangles, 1, 0)
-    first, second, place = second - origin, third - origin, (x, y) - origin[:, :2]
+    first = second - origin
+    second = third - origin
+    place = (x, y) - origin[:, :2]
     area = cross(first, second)
     # A face on edge has no area.
     area[np.abs(area) < 1e-12] = np.nan
-    u, v = cross(place, second) / area, cross(first, place) / area
+    u = cross(place, second) / area
+    v = cross(first, place) / area
     inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
     heights = (origin[:, 2] + u * first[:, 2] + v * second[:, 2])[inside]
     return float(heights.max()) if len(heights) else None
@@ -222,8 +228,10 @@ def height_at(surface: Surface, x: float, y: float) -> float | None:
 def _sheet(rows: int, columns: int) -> np.ndarray:
     """Faces between neighbouring rows of points, where each row is a closed loop."""
     row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
-    here, right = row * columns + column, row * columns + (column + 1) % columns
-    below, diagonal = here + columns, right + columns
+    here = row * columns + column
+    right = row * columns + (column + 1) % columns
+    below = here + columns
+    diagonal = right + columns
     faces = np.stack([np.stack([here, below, diagonal], axis=-1), np.stack([here, diagonal, right], axis=-1)])
     return faces.reshape(-1, 3).astype(np.uint32)
 
@@ -262,7 +270,8 @@ def lines(ends: np.ndarray, color: Color) -> meshcat.LineSegments:
 def outline(model: Model, shape: Surface) -> np.ndarray:
     """Ends (24, 3) of the 12 edges of the box around `shape` in the axes of the model; world frame."""
     own = shape.at(model.pose.inverse()).vertices
-    low, high = own.min(axis=0), own.max(axis=0)
+    low = own.min(axis=0)
+    high = own.max(axis=0)
     return Surface(edges_of(low, high), shape.faces).at(model.pose).vertices
 
 

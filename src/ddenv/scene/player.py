@@ -41,7 +41,9 @@ class Player:
     """
 
     def __init__(self, run: RunFile, stage: Stage, say: Callable[..., None]) -> None:
-        self._run, self._stage, self._say = run, stage, say
+        self._run = run
+        self._stage = stage
+        self._say = say
         scenario, world, robot = read_parts(run)
         self._name = scenario.name
         self._position = Position(run.events)
@@ -50,7 +52,8 @@ class Player:
         wheels = Wheels(robot, scenario.robot.wheels, scenario.controller.skid)
         self._scenery = Scenery(stage, world, wheels, self._elements)
         self._start = spawn_pose(scenario.robot.spawn) @ robot.pose.inverse() @ robot.links[0].pose
-        self._epsilon, self._timeout = scenario.failure.epsilon, scenario.failure.timeout
+        self._epsilon = scenario.failure.epsilon
+        self._timeout = scenario.failure.timeout
         self._shot: Shot | None = None
         self._ran_at = -math.inf
         self._live: list[Live] = []
@@ -87,7 +90,8 @@ class Player:
         started. `turned` has how far left and right wheels have turned at each row of the robot, rad, as its way makes them roll.
         Raises UserError where the robot's way is missing or damaged.
         """
-        shot, scenery = self._shot_of(test), self._scenery
+        shot = self._shot_of(test)
+        scenery = self._scenery
         one = played(self._run, self._position, test)
         if not one.rows:
             raise UserError(one.lacks[-1])
@@ -163,7 +167,8 @@ class Player:
         """A finished test as it was made: in the environment of that moment. Raises UserError."""
         if test < 0:
             return shot_of_test(self._state, "replay", changed_run(self._state, test)[1])
-        start, state = self._position.start_of(test), self._state
+        start = self._position.start_of(test)
+        state = self._state
         if start is None or test > len(state.tests) or not state.test(test).is_finished:
             raise UserError(f"{self._run.path}: test {test} has not ended")
         return shot_of_test(start.after, "replay", state.test(test))
@@ -183,7 +188,8 @@ class Player:
             samples = None if self._evidence is None else self._run.motion(self._evidence)
             self._scenery.evidence(None if samples is None else table(samples))
             if self._state.f_position is not None:
-                place, size = self._state.f_position, self._scenery.scale
+                place = self._state.f_position
+                size = self._scenery.scale
                 mark(self._stage, "failure", place, self._epsilon, colors.FAILURE, size, PIN)
         self._show_parts()
         if following != self._shot:
@@ -191,7 +197,8 @@ class Player:
         self._move()
 
     def _cut(self, following: Shot) -> None:
-        before, self._shot = self._shot, following
+        before = self._shot
+        self._shot = following
         self._scenery.show(following)
         self._caption(following, "")
         if before is not None and (before.kind, before.test) == (following.kind, following.test):

@@ -36,7 +36,8 @@ from ddenv.runs.remembered import read_state, write_state
 from ddenv.scene.player import Player
 
 # Where the scenes of runs were served last, so many of them.
-FILE, MOST = "scenes.json", 50
+FILE = "scenes.json"
+MOST = 50
 TOKEN_BYTES = 16
 _TOKEN = re.compile(r"[\w-]{22}")
 LOOPBACK = "127.0.0.1"
@@ -147,7 +148,8 @@ class _Asked(_Handler):
     """Answers what a page asks for; reading is all that it can do."""
 
     def get(self, what: str, number: str | None) -> None:
-        test, player = int(number or 0), self._server.player
+        test = int(number or 0)
+        player = self._server.player
         assert player is not None
         try:
             if what == "pairs":

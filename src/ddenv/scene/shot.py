@@ -63,7 +63,8 @@ def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Sh
 
 def shot_of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial | None = None) -> Shot:
     """What to show of a test, which belongs to `state`, and was made for `row` if that is given."""
-    name, models = purpose(state, test) if row is None else row.label, frozenset(state.models_of(test))
+    name = purpose(state, test) if row is None else row.label
+    models = frozenset(state.models_of(test))
     if test.id == state.evidence_test and kind == "replay" and row is None:
         name = "the failure f" if test.id in state.failures[:1] else "the failure in what is left"
         models = frozenset(state.environment)

@@ -44,7 +44,8 @@ class Stage:
     def move(self, path: Path, pose: Pose, *, newest_only: bool = False) -> None:
         """Places everything at and below `path`."""
         matrix = np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = pose.rotation(), pose.position
+        matrix[:3, :3] = pose.rotation()
+        matrix[:3, 3] = pose.position
         self._keep(path, "transform", {"type": "set_transform", "matrix": matrix.T.ravel().tolist()}, newest_only)
 
     def show(self, path: Path, visible: bool) -> None:

@@ -19,7 +19,8 @@ from ddenv.world.pose import Pose, Vector, pose_of
 from ddenv.world.scenario import Wheels as Named
 
 # Spokes, so that a plain wheel is seen to turn: their width, as part of its radius, and how far they stand out of it, m.
-SPOKE, OUT = 0.12, 0.003
+SPOKE = 0.12
+OUT = 0.003
 SPOKE_COLOR = (0.75, 0.76, 0.78, 1.0)
 
 
@@ -48,7 +49,8 @@ class Wheels:
 
     def __init__(self, robot: Model, named: Named | None = None, skid: float = 1.0) -> None:
         """`named` and `skid` are the scenario's wheels and the skid of its controller."""
-        self._robot, self._skid = robot, skid
+        self._robot = robot
+        self._skid = skid
         self._drive: Drive | None = None
         with suppress(UserError):
             self._drive = find_drive(robot, named)
@@ -81,11 +83,13 @@ class Wheels:
             wheel = mesh.merge([item.at(to_wheel) for item in paint(links)])
             # Two bars that cross on the axis, on both faces of the wheel.
             along = wheel.vertices @ (x, y, z) if len(wheel.vertices) else np.zeros(1)
-            width, middle = float(np.ptp(along)) + 2 * OUT, float(along.min() + along.max()) / 2
+            width = float(np.ptp(along)) + 2 * OUT
+            middle = float(along.min() + along.max()) / 2
             # The shortest turn from y, along which the bars are made, to the axis.
             turn = (1 + y, z, 0.0, -x) if y > -1 + 1e-9 else (0.0, 1.0, 0.0, 0.0)
             at = pose_of((middle * x, middle * y, middle * z, *turn))
-            long, thick = 1.7 * drive.radius, SPOKE * drive.radius
+            long = 1.7 * drive.radius
+            thick = SPOKE * drive.radius
             bars = [mesh.box(size).at(at) for size in ((long, width, thick), (thick, width, long))]
             spokes = mesh.merge(bars).painted(SPOKE_COLOR)
             whole = replace(mesh.merge([wheel, spokes]), alpha=1.0)

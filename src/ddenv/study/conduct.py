@@ -44,7 +44,9 @@ class Work:
     """A cell in work by so many `workers`; its run was as `before`. `problem` says why it did not end this time."""
 
     def __init__(self, folder: Path, cell: Cell, workers: int) -> None:
-        self.cell, self.workers, self.problem = cell, workers, ""
+        self.cell = cell
+        self.workers = workers
+        self.problem = ""
         self.path = run_path(folder, cell)
         if not self.path.exists():
             create_run(cell.scenario, self.path)
@@ -101,12 +103,16 @@ class Runner:
     """
 
     def __init__(self, plan: Plan, folder: Path, cells: Sequence[Cell], jobs: int, out: TextIO) -> None:
-        self._plan, self._folder, self._jobs = plan, folder, jobs
+        self._plan = plan
+        self._folder = folder
+        self._jobs = jobs
         self._waiting = list(cells)
         self.running: list[Work] = []
         self._ended: list[Work] = []
-        self._out, self._live = out, out.isatty() and os.environ.get("TERM") != "dumb"
-        self._earlier, self._session = sessions(folder), Session(time.time(), 0.0, jobs, 0, versions(), machine())
+        self._out = out
+        self._live = out.isatty() and os.environ.get("TERM") != "dumb"
+        self._earlier = sessions(folder)
+        self._session = Session(time.time(), 0.0, jobs, 0, versions(), machine())
         self._began = self._next_record = time.monotonic()
         self._next_line = self._began + QUIET
 
@@ -183,7 +189,8 @@ class Runner:
         return f"{cells - len(self._waiting) - len(self.running)}/{cells}"
 
     def _record(self) -> None:
-        seconds, tests = time.monotonic() - self._began, sum(work.tests for work in (*self.running, *self._ended))
+        seconds = time.monotonic() - self._began
+        tests = sum(work.tests for work in (*self.running, *self._ended))
         write_sessions(self._folder, (*self._earlier, replace(self._session, seconds=seconds, tests=tests)))
 
     def _say(self, line: str) -> None:

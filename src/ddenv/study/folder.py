@@ -18,7 +18,8 @@ from ddenv.study.plan import RUNS
 from ddenv.text import count
 from ddenv.world.access import read_bytes, write_file
 
-ABOUT, LOCK = "study.json", "study.lock"
+ABOUT = "study.json"
+LOCK = "study.lock"
 # A machine's name may be anything.
 LONGEST_NAME = 120
 
@@ -26,7 +27,8 @@ LONGEST_NAME = 120
 @contextmanager
 def opened(folder: Path) -> Iterator[None]:
     """Creates the folder if needed, and locks it against other studies. Raises UserError."""
-    refused, instead = f"{folder}: cannot be written", "choose another folder with -o"
+    refused = f"{folder}: cannot be written"
+    instead = "choose another folder with -o"
     try:
         if folder.exists() and not folder.is_dir():
             raise UserError(f"{folder}: is a file; give the name of a folder")

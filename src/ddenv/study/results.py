@@ -130,8 +130,11 @@ def read_cell(folder: Path, cell: Cell) -> Result:
 def _read(file: RunFile, cell: Cell) -> Result:
     state = RunState()
     # The numbers of the tests that the search and the certificates rest on, in order.
-    search, fresh = dict[int, None](), dict[int, None]()
-    sizes, misses, steps_back = list[tuple[int, int]](), list[int](), 0
+    search = dict[int, None]()
+    fresh = dict[int, None]()
+    sizes = list[tuple[int, int]]()
+    misses = list[int]()
+    steps_back = 0
     for recorded, _, state in steps(file.events()):
         match event := recorded.event:
             case TestFinished(test) if state.test(test).phase == "baseline":
@@ -263,6 +266,7 @@ def spread(values: Sequence[float], said: Callable[[float], str]) -> str:
     """One value, or the median with the range; "–" for none."""
     if not values:
         return "–"
-    low, high = said(min(values)), said(max(values))
+    low = said(min(values))
+    high = said(max(values))
     middle = said(median(values))
     return middle if low == high else f"{middle} ({low} to {high})"

@@ -130,7 +130,9 @@ def table(folder: Path, results: Sequence[Result]) -> str:
 
 
 def _row(folder: Path, result: Result) -> dict[str, object]:
-    cell, base, paper = result.cell, result.baseline, paper_row(result.cell)
+    cell = result.cell
+    base = result.baseline
+    paper = paper_row(result.cell)
     partitioning, prioritization = cell.method.parts
     left, *removals = result.certificate.claims if result.certificate is not None else (None,)
     most = max((claim.shown / claim.runs for claim in removals if claim and claim.runs), default=None)

@@ -20,11 +20,15 @@ from ddenv.study.results import Result, Row, spread
 from ddenv.text import Names, count, plain
 
 HEIGHT = 320.0
-LINE, SAMPLE = 22.0, 30.0
+LINE = 22.0
+SAMPLE = 30.0
 # Widths of the lines of methods with their own colour: where lines coincide, the wider first ones stay visible.
 WIDTHS = (9.0, 5.0, 2.4, 2.2, 2.0, 2.0)
 # The maximum number of worlds drawn for a scenario, of models named for each and in a table, and of cells named for a problem.
-MOST_WORLDS, MOST_LEFT, MOST_NAMES, MOST_CELLS = 4, 12, 8, 3
+MOST_WORLDS = 4
+MOST_LEFT = 12
+MOST_NAMES = 8
+MOST_CELLS = 3
 # A comparison needs at least this many methods.
 FEWEST = 4
 BOUNDS = (
@@ -47,12 +51,15 @@ def models(rows: Sequence[Row]) -> int:
 
 def chart(rows: Sequence[Row]) -> str:
     """The chart of a scenario with at least one result that came to an end."""
-    own, others = [row for row in rows if row.over], list[Row]()
+    own = [row for row in rows if row.over]
+    others = list[Row]()
     if len(own) > len(WIDTHS):
         # With a colour of their own: the paper's methods, in their order, and those with the fewest tests.
         own.sort(key=lambda row: (0,) if row.paper else (1, not row.certified, row.tests or 0.0))
-        own, others = own[: len(WIDTHS)], own[len(WIDTHS) :]
-    last, most = max(1, *(result.tests for result in over(rows))), max(1, models(rows))
+        others = own[len(WIDTHS) :]
+        own = own[: len(WIDTHS)]
+    last = max(1, *(result.tests for result in over(rows)))
+    most = max(1, models(rows))
     at = scale(last, most, HEIGHT)
     looks = [("faint", "", 0.0, row) for row in others]
     looks += [
@@ -116,7 +123,8 @@ def _map(folder: Path, result: Result, name: str) -> Block:
 
 def section(folder: Path, rows: Sequence[Row]) -> Section:
     scenario = rows[0].scenario
-    file, table = file_name(scenario), next((row.paper.table for row in rows if row.paper), "")
+    file = file_name(scenario)
+    table = next((row.paper.table for row in rows if row.paper), "")
     title = plain(scenario.name) + (f", {count(models(rows), 'model')}" if models(rows) else "")
     title += f" (Table {table} of the paper)" if table else ""
     blocks: list[Block] = [say(plain(scenario.description))] if scenario.description else []
@@ -135,13 +143,15 @@ def _table(rows: Sequence[Sequence[tuple[str, Cell]]], right: Collection[int]) -
 
 def numbers(rows: Sequence[Row]) -> Table:
     """Whether the result is certified; tests, reduction and minutes, beside the paper's if it has them."""
-    beside, slices = any(row.paper for row in rows), any(row.sliced for row in rows)
+    beside = any(row.paper for row in rows)
+    slices = any(row.sliced for row in rows)
     cells = [list(_numbers(row, beside, slices)) for row in rows]
     return _table(cells, range(2, len(cells[0])))
 
 
 def _numbers(row: Row, beside: bool, slices: bool) -> Iterator[tuple[str, Cell]]:
-    results, paper = row.over, row.paper
+    results = row.over
+    paper = row.paper
     sliced = [result for result in row.sliced if result.certificate is not None]
     certified = f"{len(row.minimal)} of {len(row.results)}"
     if len(row.results) == 1:

@@ -43,7 +43,8 @@ def failed_in(state: RunState, found: BaselineFinished) -> str:
 
 def missed(state: RunState) -> str:
     """How likely all runs of a candidate miss f, by the baseline's rate and its interval; without a full stop."""
-    base, asked = state.baseline, settings(state)
+    base = state.baseline
+    asked = settings(state)
     if base is None:
         return ""
     if asked.accept_rate == "exact":

@@ -26,7 +26,8 @@ from ddenv.runfile.supports import stack_with
 from ddenv.text import Sentences, between, count, first_of, percent, percent_at_least, percent_at_most
 from ddenv.words.signs import metres
 
-MOST_NAMES, MOST_SEEDS = 3, 4
+MOST_NAMES = 3
+MOST_SEEDS = 4
 
 
 def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single model") -> str:
@@ -58,11 +59,10 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         return (
             f"minimal but for {first_of(helps, MOST_NAMES)}: {kept(certificate)}; without {helps[0]} {rate(first)}{but}"
         )
-    most, one = max(removals, key=lambda claim: claim.high), f"{'other ' if pinned else ''}{each}"
-    without, bound = (
-        f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without,
-        _at_most(certificate),
-    )
+    most = max(removals, key=lambda claim: claim.high)
+    one = f"{'other ' if pinned else ''}{each}"
+    without = f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without
+    bound = _at_most(certificate)
     often = rate(most) if bound is None else f"{_seldom(removals)} (upper bound: {percent_at_most(bound)} as often)"
     return f"no {one} can be removed: {kept(certificate)}; without {without}, {often}{but}"
 
@@ -252,7 +252,8 @@ def means(state: RunState, certificate: Certificate, claim: Claim) -> str:
 
 def meaning(claim: Claim, certificate: Certificate) -> str:
     """What the verdict of a claim means, in plain words."""
-    rate, bound = _whole_rate(certificate), claim.bound
+    rate = _whole_rate(certificate)
+    bound = claim.bound
     if claim.without is None and bound is not None and claim.verdict in ("not shown", "unknown"):
         return f"shown to keep at least {percent_at_least(bound)} of {rate}, not {percent_at_least(certificate.certify_rate)}"
     often = "with none of these seeds" if claim.is_exact else _as_often(bound)
@@ -283,7 +284,8 @@ def of_passing(state: RunState, one: Isolation) -> str:
             f"{count(len(set().union(*stacks)), 'model')} that may be removed"
         )
     check = one.checks[-1]
-    gone, (first, *backs) = state.removals[check.removal - 1].models, check.claims
+    gone = state.removals[check.removal - 1].models
+    (first, *backs) = check.claims
     names = f"{count(len(gone), 'model')} of {len(state.elements)} ({first_of(gone, MOST_NAMES)})"
     if one.found is None:
         return f"no world is shown to pass: without {names} {_reaching(one, first)}"
@@ -365,10 +367,8 @@ def promise(state: RunState, certificate: Certificate) -> str:
             "minimal means: for the chosen seeds this is exact, since a seed repeats its run exactly; for other seeds, fresh "
             "runs measure how often f shows, and nothing more"
         )
-    kept, pinned = (
-        f"{percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}",
-        never_left_out(state, certificate),
-    )
+    kept = f"{percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}"
+    pinned = never_left_out(state, certificate)
     often = _as_often(_at_most(certificate))
     return (
         f"minimal means: what is left keeps at least {kept}; with {_any_one(pinned)} removed, f shows {often}; "

@@ -48,7 +48,8 @@ NAMED_ENDS = 2
 # An end within so many epsilon of f's end may be the same failure to the user.
 NEAR = 3
 # The maximum number of pinned models that a sentence names, and the maximum width of each name in cells.
-PINNED, LONGEST = 2, 32
+PINNED = 2
+LONGEST = 32
 # Decisions that change the environment or the search.
 _CHANGES = ("go_back", "undo", "pin", "unpin", "change", "adopt", "leave_out", "accept_other")
 _SETTLING = (
@@ -85,7 +86,8 @@ def explain(snapshot: Snapshot) -> Explanation:
 
 def _warnings(snapshot: Snapshot) -> Sentences:
     """What the user has to know before anything else, and a try that could become the environment."""
-    state, said = snapshot.state, []
+    state = snapshot.state
+    said = []
     if snapshot.older_engine and snapshot.engine == "alive":
         version = plain(snapshot.older_engine)
         said.append(
@@ -93,7 +95,8 @@ def _warnings(snapshot: Snapshot) -> Sentences:
         )
     if words := refuted_words(state):
         said.append(as_sentence(words))
-    here, rates = state.here, drift(state)
+    here = state.here
+    rates = drift(state)
     if has_dropped(state) and rates and here is not None and here.parent is not None:
         before = count(len(state.nodes[here.parent].environment), "model")
         said.append(f"f is rarer than it was: {rates[0]}. u goes back to {before}.")
@@ -145,7 +148,8 @@ def _arrival(state: RunState) -> str:
 
 
 def _happening(snapshot: Snapshot) -> Happening:
-    state, options = snapshot.state, settings(snapshot.state)
+    state = snapshot.state
+    options = settings(snapshot.state)
     if snapshot.gone:
         return None, (
             f"{plain(snapshot.error)}.",
@@ -167,7 +171,8 @@ def _happening(snapshot: Snapshot) -> Happening:
         return _with_pause(state, ("split", _between(snapshot, options)))
     if state.waiting_candidate is not None:
         candidate = state.round.candidates[state.waiting_candidate]
-        before, after = len(state.environment), count(candidate.size, "model")
+        before = len(state.environment)
+        after = count(candidate.size, "model")
         return "waiting", (
             f"{candidate.label} shows f: {_ended(state, candidate, options)}",
             f"The reduction waits for you: a accepts it ({before} → {after}), x rejects it and goes on.",
@@ -239,7 +244,8 @@ def _baseline_so_far(state: RunState, options: Settings) -> Sentences:
 
 
 def _between(snapshot: Snapshot, options: Settings) -> Sentences:
-    state, here = snapshot.state, snapshot.state.here
+    state = snapshot.state
+    here = snapshot.state.here
     number = 1 if state.round is None else state.round.number + 1
     first = f"Round {number}: {beginning(options, len(state.environment))}"
     # How the environment was cut down to its slice, until the next test is made.
@@ -442,7 +448,8 @@ def _certifying(snapshot: Snapshot) -> Sentences:
         return (over, *_now(snapshot, certificate))
     made = fresh_runs_made(state, certificate)
     done = f"{made} {'is' if made == 1 else 'are'} done"
-    rows, aim = fresh_runs(state), certificate.certify_rate
+    rows = fresh_runs(state)
+    aim = certificate.certify_rate
     shown = rows[0].bound or 0.0 if rows else 0.0
     kept = f"at least {percent_at_least(shown)} is kept" if shown else "nothing is shown yet"
     return (
@@ -457,7 +464,8 @@ def _certifying(snapshot: Snapshot) -> Sentences:
 def _so_far(rows: Sequence[FreshRuns]) -> Sentences:
     if not rows or not rows[0].runs:
         return ()
-    left, whole = rows[0], rows[-1]
+    left = rows[0]
+    whole = rows[-1]
     beside = ""
     if whole.without is None and whole.runs and len(rows) > 1 and not whole.is_chosen:
         beside = f", and in {of_runs(whole.shown, whole.runs)} of {environment_named(whole.node)}"

@@ -47,7 +47,8 @@ def rows(margins: Margins) -> tuple[Row, ...]:
     """The table of all numbers that were looked at."""
     found = []
     for one in margins_of(margins):
-        name, now = one.asked.name, f"{one.asked.now:.4g} {one.asked.unit}".rstrip()
+        name = one.asked.name
+        now = f"{one.asked.now:.4g} {one.asked.unit}".rstrip()
         sides = [side for side in one.sides if side.tried]
         until = " … ".join("now" if side.until is None else f"{side.until.value:.4g}{_end(side)}" for side in sides)
         instead = ", ".join(words for side in sides if (words := _from(side)))

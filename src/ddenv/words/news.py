@@ -62,7 +62,8 @@ def _where(state: RunState) -> str:
 
 def isolating(state: RunState) -> str:
     """How far an isolation is: what it tries, or which world fresh runs judge."""
-    running, now = state.running_tests, state.isolating
+    running = state.running_tests
+    now = state.isolating
     last = next((test.removal for test in running if test.removal is not None), None)
     if last is None or now is None:
         return ISOLATING
@@ -119,7 +120,8 @@ def _round_started(_: RunState, after: RunState) -> str:
     round = after.round
     if round is None:
         return ""
-    models, parts = count(len(round.environment), "model"), count(len(round.partitions), "partition")
+    models = count(len(round.environment), "model")
+    parts = count(len(round.partitions), "partition")
     return f"round {round.number}: {models} in {parts}, {count(len(round.candidates), 'candidate')}"
 
 
@@ -239,7 +241,9 @@ def happened(moment: Moment) -> str:
 
 def what_happened(moment: Moment) -> str:
     """The same in a few words, without the time."""
-    kind, event, state = moment.recorded.kind, moment.recorded.event, moment.after
+    kind = moment.recorded.kind
+    event = moment.recorded.event
+    state = moment.after
     if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
         return _of_test(state, state.test(event.test))
     if kind == "created":

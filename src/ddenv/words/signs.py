@@ -76,7 +76,8 @@ _SIGNED = ("similar", "other", "pass", "error", "timeout", "failed")
 
 def bar(part: float, aim: float) -> str:
     """A share as a bar of 20 cells, with a mark where it has to come."""
-    filled, mark = round(part * 20), min(19, round(aim * 20))
+    filled = round(part * 20)
+    mark = min(19, round(aim * 20))
     return "".join("┃" if cell == mark else "█" if cell < filled else "░" for cell in range(20))
 
 

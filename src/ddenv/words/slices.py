@@ -32,7 +32,8 @@ def slice_words(state: RunState, node: Node) -> str:
 def slice_in_short(state: RunState, node: Node) -> str:
     """The same where there is little room: at most 78 characters."""
     before = 0 if node.parent is None else len(state.nodes[node.parent].environment)
-    met, gone = met_by(state, node), before - len(node.environment)
+    met = met_by(state, node)
+    gone = before - len(node.environment)
     return f"none of {count(len(met), 'run')} met the other {gone}; a fresh run meets one: {_chance(met)}"
 
 

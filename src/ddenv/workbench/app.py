@@ -45,7 +45,8 @@ def attention(title: str, words: str, environment: Mapping[str, str]) -> str:
 
     OSC 777 is for VTE (GNOME Terminal and others) and rxvt, OSC 9 for the others: iTerm2, WezTerm, kitty, Ghostty, foot, Windows.
     """
-    title, words = plain(title).replace(";", ","), plain(words).replace(";", ",")
+    title = plain(title).replace(";", ",")
+    words = plain(words).replace(";", ",")
     if "VTE_VERSION" in environment or environment.get("TERM", "").startswith("rxvt"):
         return f"{BELL}\x1b]777;notify;{title};{words}\x1b\\"
     return f"{BELL}\x1b]9;{title}: {words}\x1b\\"
@@ -113,9 +114,13 @@ class Workbench(App[int]):
             self.register_theme(theme)
         config = config or Config()
         self.theme = config.theme or DARK.name
-        self._own_keys, self._notifies = config.keys, config.notify
+        self._own_keys = config.keys
+        self._notifies = config.notify
         self._held: tuple[str, Data] | None = None
-        self._first, self._run, self._watch, self._file = first, run, watch, file
+        self._first = first
+        self._run = run
+        self._watch = watch
+        self._file = file
         if run is not None:
             from ddenv.workbench.shared.observed import Observed
 
@@ -185,7 +190,8 @@ class Workbench(App[int]):
 
     def _show_held(self) -> None:
         if self._held is not None and not any(isinstance(screen, ModalScreen) for screen in self.screen_stack[-1:]):
-            (message, options), self._held = self._held, None
+            (message, options) = self._held
+            self._held = None
             self.clear_notifications()
             super().notify(message, **options)
 

@@ -143,7 +143,8 @@ def read_config() -> Config:
 
 def lines() -> list[str]:
     """The file, the theme, whether the terminal rings, and every action with its keys. Raises UserError for an invalid file."""
-    config, path = read_config(), config_path()
+    config = read_config()
+    path = config_path()
     found = [
         f"file    {path}{'' if path.exists() else ' (does not exist; ddenv config --example prints one)'}",
         f"theme   {config.theme or f'{DARK.name}, or ansi-dark where the terminal has 16 colours'}",

@@ -47,7 +47,9 @@ MEANINGS = {
 }
 WRITING = "writing ... escape stops it"
 # Maximum number of existing files to name, of files that a world needs to name, and of characters of each of those.
-MOST_NAMED, MOST_NEEDS, LONGEST_NEED = 3, 3, 60
+MOST_NAMED = 3
+MOST_NEEDS = 3
+LONGEST_NEED = 60
 # The files to write, by the ids of `KINDS`.
 Wanted = Mapping[str, Path]
 
@@ -81,7 +83,8 @@ class ExportScreen(ModalScreen[None]):
     def __init__(self, run: Path, world: Path = Path()) -> None:
         super().__init__()
         # Not `run`, which is a method of every screen.
-        self._file, self._world = run, world
+        self._file = run
+        self._world = world
         self._agreed: frozenset[Path] = frozenset()
         self._busy = False
 
@@ -157,7 +160,8 @@ class ExportScreen(ModalScreen[None]):
 
     def _wanted(self) -> Wanted:
         """Raises UserError for names that cannot be used."""
-        folder, wanted = without_tilde(self._value("folder") or "."), {}
+        folder = without_tilde(self._value("folder") or ".")
+        wanted = {}
         for id, title, _, endings in KINDS:
             if not self.query_one(f"#export-{id}", Checkbox).value:
                 continue
@@ -182,7 +186,9 @@ class ExportScreen(ModalScreen[None]):
         if there and not self._agreed.issuperset(there):
             call_if_open(self, self._ask, there)
             return
-        written, wrong, worker = list[str](), "", get_current_worker()
+        written = list[str]()
+        wrong = ""
+        worker = get_current_worker()
         try:
             for line in write(self._file, wanted, lambda: worker.is_cancelled):
                 written.append(line)
@@ -192,7 +198,8 @@ class ExportScreen(ModalScreen[None]):
         self.app.call_from_thread(self._done, written, wrong)
 
     def _ask(self, there: list[Path]) -> None:
-        self._busy, self._agreed = False, frozenset(there)
+        self._busy = False
+        self._agreed = frozenset(there)
         names = first_of([plain(path.name) for path in there], MOST_NAMED)
         verb = "exists" if len(there) == 1 else "exist"
         self._report("", f"{names} {verb} already. Write again to replace, or give other names.")

@@ -91,7 +91,8 @@ class History(Screen[int | None]):
         if (state.nodes, state.node) != (self._tree, self._here):
             at = self.under_cursor
             stays = None if at is None or at.number == self._here else at.number
-            self._tree, self._here = state.nodes, state.node
+            self._tree = state.nodes
+            self._here = state.node
             self._rows = branches.rows(state.nodes, state.node)
             self._fill(self._here if stays is None else stays)
 
@@ -99,7 +100,8 @@ class History(Screen[int | None]):
         table = self.query_one(DataTable)
         table.clear()
         for row in self._rows:
-            node, here = row.node, self._here
+            node = row.node
+            here = self._here
             style = "bold" if node.number == here else "dim" if node.rejected or node.lost_rate else ""
             size = f"{row.lines}{branches.sign(node, here)} {count(len(node.environment), 'model')}"
             marked = "marked" if node.number == self._marked else ""
@@ -133,7 +135,8 @@ class History(Screen[int | None]):
         node = self.under_cursor
         if node is None:
             return
-        now, command = self._look_at(), GoBack(node.number)
+        now = self._look_at()
+        command = GoBack(node.number)
         if why := refusal(command, now):
             refuse(self, why)
             return
@@ -164,7 +167,8 @@ def lines(first: Node, second: Node, here: int) -> Iterator[tuple[str, str, str]
     yield "method", plain(first.method), plain(second.method)
     yield "own tests", str(first.own_tests), str(second.own_tests)
     yield "in the run", branches.words(first, here), branches.words(second, here)
-    left, right = frozenset(first.environment), frozenset(second.environment)
+    left = frozenset(first.environment)
+    right = frozenset(second.environment)
     common = _named([name for name in first.environment if name in right])
     yield "in both", common, common
     alone = [_named([name for name in node.environment if name not in left & right]) for node in (first, second)]

@@ -49,7 +49,8 @@ GUIDES = {
 }
 _KEYS = {key: words for words, (_, key, _) in GUIDES.items()}
 # How often the run file is read, s, and how many lines of what happened before are said first.
-PERIOD, BEFORE = 0.2, 10
+PERIOD = 0.2
+BEFORE = 10
 YES = ("y", "yes")
 WATCHING = "watching only: nothing that you type changes the run"
 
@@ -103,10 +104,12 @@ QUESTIONS: dict[str, tuple[Callable[[Snapshot], Iterator[str]], str]] = {
 def meaning(line: str, now: Situation) -> Offer | None:
     """What a line asks for now; None if it guides nothing. Raises UserError for a row or a model that there is not."""
     first, _, rest = line.strip().partition(" ")
-    word, rest = first if first in GUIDES else _KEYS.get(first, ""), rest.strip()
+    word = first if first in GUIDES else _KEYS.get(first, "")
+    rest = rest.strip()
     if not word:
         return None
-    action, state = GUIDES[word][0], now.state
+    action = GUIDES[word][0]
+    state = now.state
     if action in ("pin", "without", "only"):
         names = tuple(name.strip() for name in rest.split(",") if name.strip())
         if not names:
@@ -180,7 +183,8 @@ class LineMode:
 
     def _do(self, line: str) -> bool:
         """Does what a line asks for; False to leave."""
-        asked, self._asked = self._asked, None
+        asked = self._asked
+        self._asked = None
         if line in ("quit", "q"):
             return False
         if asked is not None and line.casefold() in YES:
@@ -238,7 +242,8 @@ class LineMode:
 
 def typed_lines(typed: TextIO) -> Iterator[str | None]:
     """Lines as they are typed, "" when there was none for `PERIOD`, and None from the end of the input on."""
-    handle, waiting = typed.fileno(), b""
+    handle = typed.fileno()
+    waiting = b""
     while True:
         if not select.select([handle], [], [], PERIOD)[0]:
             yield ""

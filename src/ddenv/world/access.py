@@ -15,7 +15,8 @@ from ddenv.world.tinyxml import Element, NotXml, parse_xml
 
 MAX_BYTES = 100_000_000  # of a file that the user names
 # How the names of worlds end: SDF, and Drake's model directives.
-SDF_ENDINGS, DIRECTIVES_ENDINGS = (".sdf", ".world"), (".dmd.yaml", ".dmd.yml")
+SDF_ENDINGS = (".sdf", ".world")
+DIRECTIVES_ENDINGS = (".dmd.yaml", ".dmd.yml")
 WORLD_ENDINGS = (*SDF_ENDINGS, *DIRECTIVES_ENDINGS)
 # What users take for worlds: macros that make one, and robots.
 OTHER_ENDINGS = (".xacro", ".urdf")

@@ -38,7 +38,8 @@ def command_words(scenario: Scenario) -> tuple[str, ...]:
     if scenario.oracle is None:
         return ()
     if scenario.oracle.command is None:
-        folder, name = _existing(scenario), scenario.oracle.program.partition(":")[0]
+        folder = _existing(scenario)
+        name = scenario.oracle.program.partition(":")[0]
         top = name.partition(".")[0]
         # Nothing of it is imported.
         if not top or not (any(folder.glob(f"{top}.*")) or (folder / top).is_dir() or find_spec(top) is not None):

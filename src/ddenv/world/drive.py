@@ -71,7 +71,8 @@ class Drive:
         if isinstance(command, WheelSpeeds):
             return np.asarray(np.array([command.speeds.get(joint, 0.0) for joint in self.joints]) * self.signs)
         difference = command.turn_rate / skid * self.track / 2
-        left, right = (command.speed - difference) / self.radius, (command.speed + difference) / self.radius
+        left = (command.speed - difference) / self.radius
+        right = (command.speed + difference) / self.radius
         sides = zip(self.left, self.signs, strict=True)
         return np.array([sign * (left if is_left else right) for is_left, sign in sides])
 

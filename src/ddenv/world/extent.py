@@ -32,7 +32,8 @@ Bounds = tuple[np.ndarray, np.ndarray]
 
 def shape_bounds(shape: Shape, pose: Pose) -> Bounds:
     """Lowest and highest corner, each shape (3,), of `shape` at `pose`. A plane has a place but no size."""
-    center, rotation = np.array(pose.position), pose.rotation()
+    center = np.array(pose.position)
+    rotation = pose.rotation()
     up = np.abs(rotation[:, 2])
     match shape:
         case Mesh(_, vertices):
@@ -51,7 +52,8 @@ def shape_bounds(shape: Shape, pose: Pose) -> Bounds:
         case Plane():
             half = np.zeros(3)
         case Terrain((length, width), heights):
-            lowest, highest = float(heights.min()), float(heights.max())
+            lowest = float(heights.min())
+            highest = float(heights.max())
             place = pose @ Pose((0.0, 0.0, (lowest + highest) / 2))
             return shape_bounds(Box((length, width, highest - lowest)), place)
     return center - half, center + half
@@ -98,7 +100,8 @@ def filled_bounds(collision: Collision) -> Bounds:
         low[2] = -np.inf
     if not isinstance(collision.shape, Plane):
         return low, high
-    low, high = np.full(3, -np.inf), np.full(3, np.inf)
+    low = np.full(3, -np.inf)
+    high = np.full(3, np.inf)
     if collision.pose.rotation()[2, 2] > 1 - 1e-9:
         high[2] = collision.pose.position[2]
     return low, high
@@ -194,9 +197,12 @@ def _box(collision: Collision, points: np.ndarray) -> Collision:
         return collision
     back = collision.pose.inverse()
     flat = (points @ back.rotation().T + back.position)[:, :2]
-    low, high = np.zeros(2), np.zeros(2)
+    low = np.zeros(2)
+    high = np.zeros(2)
     if len(flat) and np.abs(flat).max() > ENDLESS / 2 - BEYOND:
-        low, high = flat.min(axis=0), flat.max(axis=0)
-    (width, length), (x, y) = (np.maximum(high - low, 0.0) + ENDLESS).tolist(), ((low + high) / 2).tolist()
+        low = flat.min(axis=0)
+        high = flat.max(axis=0)
+    width, length = (np.maximum(high - low, 0.0) + ENDLESS).tolist()
+    x, y = ((low + high) / 2).tolist()
     place = Pose((x, y, -DEPTH / 2))
     return replace(collision, shape=Box((width, length, DEPTH)), pose=collision.pose @ place)

@@ -124,7 +124,9 @@ def _wrong(where: str, key: str, words: str, named: Mapping[str, str]) -> UserEr
 def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
     """One of pydantic's errors in our words: the key; then what is wrong with its value, and what is allowed."""
     location = [str(part) for part in error["loc"]]
-    key, kind, found = ".".join(location), error["type"], _shown(error["input"])
+    key = ".".join(location)
+    kind = error["type"]
+    found = _shown(error["input"])
     if kind == "extra_forbidden":
         shorthands = [one.name for one in SETTINGS.values() if not one.stored and [one.section] == location[:-1]]
         known = sorted([*_section(model, location[:-1]).model_fields, *shorthands])

@@ -334,9 +334,12 @@ def is_ground(model: Model) -> bool:
 
 def unique_names(names: Sequence[str], sign: str, others: Collection[str] = ()) -> list[str]:
     """`names` with repeated ones made unique, also among `others`: with the `sign` " #" the second `name` becomes `name #2`, ..."""
-    given, taken, unique = Counter(others), {*names, *others}, []
+    given = Counter(others)
+    taken = {*names, *others}
+    unique = []
     for name in names:
-        own, number = name, given[name]
+        own = name
+        number = given[name]
         while number and own in taken:
             number += 1
             own = f"{name}{sign}{number}"

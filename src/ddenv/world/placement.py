@@ -33,7 +33,8 @@ UNLIKE = {
 # A line names so many models.
 MOST_NAMES = 3
 # The steps in which a free place is looked for, and how far, m.
-STEP, FAR = 0.2, 2.0
+STEP = 0.2
+FAR = 2.0
 
 
 def spawn_pose(spawn: Spawn) -> Pose:
@@ -285,7 +286,8 @@ def inside(world: World) -> list[Inside]:
     shapes, boxes = _shapes(world)
     deepest: dict[tuple[str, str], float] = {}
     for first, second in islice(_near(shapes, boxes), MOST_PAIRS):
-        (model, shape), (other, obstacle) = shapes[first], shapes[second]
+        (model, shape) = shapes[first]
+        (other, obstacle) = shapes[second]
         # What cannot move, or has no end, is the obstacle.
         if model.static or isinstance(shape.shape, Ground):
             (model, shape), (other, obstacle) = (other, obstacle), (model, shape)

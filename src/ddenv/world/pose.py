@@ -28,9 +28,12 @@ class Pose:
     @classmethod
     def from_rpy(cls, x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> Pose:
         """SDF's `x y z roll pitch yaw`: m and rad, rotations about the fixed x, then y, then z axis."""
-        cr, sr = math.cos(roll / 2), math.sin(roll / 2)
-        cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
-        cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+        cr = math.cos(roll / 2)
+        sr = math.sin(roll / 2)
+        cp = math.cos(pitch / 2)
+        sp = math.sin(pitch / 2)
+        cy = math.cos(yaw / 2)
+        sy = math.sin(yaw / 2)
         quaternion = (
             cr * cp * cy + sr * sp * sy,
             sr * cp * cy - cr * sp * sy,
@@ -57,7 +60,9 @@ class Pose:
         """`vector`, given in this frame, expressed in the parent's axes."""
         w, x, y, z = self.quaternion
         vx, vy, vz = vector
-        tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+        tx = 2 * (y * vz - z * vy)
+        ty = 2 * (z * vx - x * vz)
+        tz = 2 * (x * vy - y * vx)
         return (
             vx + w * tx + y * tz - z * ty,
             vy + w * ty + z * tx - x * tz,
@@ -155,7 +160,8 @@ def pose_at(samples: np.ndarray, time: float) -> Pose:
     after = int(np.clip(np.searchsorted(samples[:, 0], time), 1, max(1, len(samples) - 1)))
     if len(samples) == 1:
         return pose_of(samples[0, 1:])
-    first, second = samples[after - 1], samples[after]
+    first = samples[after - 1]
+    second = samples[after]
     span = second[0] - first[0]
     part = float(np.clip((time - first[0]) / span, 0.0, 1.0)) if span > 0 else 1.0
     # Of the two quaternions of a rotation, the one on the same side gives the shorter path.

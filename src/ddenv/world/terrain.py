@@ -43,6 +43,9 @@ def surface(terrain: Terrain) -> Mesh:
     x, y = (np.linspace(-0.5, 0.5, count) for count in heights.shape[::-1])
     vertices = np.stack([*np.meshgrid(x * terrain.size[0], y * terrain.size[1]), heights], axis=-1).reshape(-1, 3)
     number = np.arange(heights.size).reshape(heights.shape)
-    first, beside, above, across = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
+    first = number[:-1, :-1]
+    beside = number[:-1, 1:]
+    above = number[1:, :-1]
+    across = number[1:, 1:]
     faces = np.stack([first, beside, across, first, across, above], axis=-1).reshape(-1, 3)
     return Mesh(f"surface of {terrain.origin}", vertices, faces.astype(np.uint32))

@@ -52,12 +52,14 @@ def without(world: World, removed: frozenset[str]) -> bytes:
         raise ValueError(f"no such model: {sorted(unknown)[0]}")
     spans = [(*span, b"") for model in world.models if model.name in removed for span in model.spans]
     spans += [(*one.span, one.instead) for one in world.shared if one.models <= removed]
-    kept, at = [], 0
+    kept = []
+    at = 0
     for start, end, instead in sorted(spans, key=lambda each: (each[0], -each[1])):
         # One may lie in another, and two models may share one.
         if start < at:
             continue
-        before, ends_line = world.text[at:start], world.text[end : end + 1] in (b"\n", b"\r", b"")
+        before = world.text[at:start]
+        ends_line = world.text[end : end + 1] in (b"\n", b"\r", b"")
         kept += [_LINE_START.sub(b"", before) if ends_line else before, instead]
         at = end
     kept.append(world.text[at:])

@@ -41,9 +41,11 @@ REFERENCE = 0
 # would keep the engine from ending.
 FETCHED = 20.0
 # The time between two looks at who is there, and between two attempts to connect, s.
-PERIOD, AGAIN = 0.5, 2.0
+PERIOD = 0.5
+AGAIN = 2.0
 # How long a scheduler may take to answer, and to say goodbye, s.
-ANSWER, GOODBYE = 10.0, 2.0
+ANSWER = 10.0
+GOODBYE = 2.0
 
 
 class Link:
@@ -61,7 +63,10 @@ class Link:
         lost: Callable[[str], None],
     ) -> None:
         """Raises UserError if no scheduler answers."""
-        self._cluster, self._attached, self._there, self._lost = cluster, attached, there, lost
+        self._cluster = cluster
+        self._attached = attached
+        self._there = there
+        self._lost = lost
         self._client: Any = None
         self._ssh: Any = None
         self._closed = threading.Event()
@@ -77,7 +82,8 @@ class Link:
         self._thread.start()
 
     def _connect(self) -> None:
-        hosts, how = hosts_of(self._cluster), {"timeout": ANSWER, "set_as_default": False, "name": "ddenv"}
+        hosts = hosts_of(self._cluster)
+        how = {"timeout": ANSWER, "set_as_default": False, "name": "ddenv"}
         if hosts:
             # Dask makes the first one its scheduler.
             self._ssh = SSHCluster([hosts[0], *hosts])
@@ -108,7 +114,8 @@ class Link:
 
     def _watch(self, client: Client) -> str:
         """Tells who is there, as often as that changes, until the scheduler is lost; returns why."""
-        before, comm = None, client.scheduler_comm
+        before = None
+        comm = client.scheduler_comm
         while not self._closed.wait(PERIOD):
             # Dask connects again by itself, but has forgotten what it was asked.
             if client.status != "running" or client.scheduler_comm is not comm:
@@ -123,7 +130,9 @@ class Link:
         return ""
 
     def _end(self) -> None:
-        ending, self._client, self._ssh = (self._client, self._ssh), None, None
+        ending = (self._client, self._ssh)
+        self._client = None
+        self._ssh = None
         for each in ending:
             # What is left of a broken connection may complain.
             with suppress(Exception):
@@ -167,7 +176,9 @@ class ClusterPool:
         """Calls `tell` with the number of tests that the cluster can run at the same time, and a sentence. Raises UserError if no
         scheduler answers, or where Drake is needed and not installed.
         """
-        self._cluster, self._tell, self._parts = cluster, tell, (scenario, world, robot)
+        self._cluster = cluster
+        self._tell = tell
+        self._parts = (scenario, world, robot)
         self._blob = pickle.dumps(self._parts)
         self._run = f"{__version__} {sha256(self._blob).hexdigest()}"
         self._topic = f"ddenv-{uuid.uuid4().hex}"
@@ -244,7 +255,8 @@ class ClusterPool:
             self._said = self._room
             self._tell(self._room, "; ".join(self._news))
             self._news.clear()
-        ready, self._ready = self._ready, []
+        ready = self._ready
+        self._ready = []
         return sorted(ready, key=lambda one: one[0])
 
     # What happens to the cluster.
@@ -388,7 +400,8 @@ class ClusterPool:
         """Drops what runs: the workers end it by themselves."""
         if self._home is not None:
             self._home.close()
-        client, taken = self._client, [worker.address for worker in self._workers.values() if worker.accepted]
+        client = self._client
+        taken = [worker.address for worker in self._workers.values() if worker.accepted]
         self._workers.clear()
         if client is not None and taken:
             with suppress(Exception):
@@ -414,6 +427,7 @@ def refusal(hello: Hello, there: Result | None, here: RunResult | None) -> str:
         moved = rows.keys() == ours.keys() and all(np.array_equal(rows[name], ours[name]) for name in ours)
         same = moved and ends[0] == ends[1]
     if not same:
-        theirs, mine = f"{hello.simulator}, {hello.machine}", f"{simulator()}, {machine()}"
+        theirs = f"{hello.simulator}, {hello.machine}"
+        mine = f"{simulator()}, {machine()}"
         return f"its first run of the whole world has different bits; it has {theirs}; this machine has {mine}"
     return ""

@@ -238,6 +238,7 @@ def _round_mesh(vertices: Floats, place: Floats, axis: Floats) -> Wheel | None:
     if reach.min() < ROUND * radius:
         return None
     tread = points[far > ROUND * radius, 2]
-    low, high = float(tread.min()), float(tread.max())
+    low = float(tread.min())
+    high = float(tread.max())
     middle = vector(place + axis * (low + high) / 2)
     return Wheel(radius, high - low, Pose(middle, turn.quaternion))

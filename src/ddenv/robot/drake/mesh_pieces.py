@@ -60,7 +60,8 @@ def _as_cylinder(mesh: Mesh) -> tuple[Shape, Pose] | None:
 
 def _cut(mesh: Mesh) -> list[Mesh]:
     """The pieces of a convex mesh, cut along the planes of a grid; the mesh itself if it is short."""
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    low = mesh.vertices.min(axis=0)
+    high = mesh.vertices.max(axis=0)
     longest = LONGEST
     while math.prod(counts := np.ceil((high - low) / longest).astype(int).tolist()) > MOST_PIECES:
         longest *= 1.25

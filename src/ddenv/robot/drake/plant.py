@@ -50,7 +50,9 @@ from ddenv.world.scenario import Simulation
 
 # Where the twins of models wait that are not at rest: this deep, and this far from each other, m. Shapes in one place would make
 # Drake's search for contacts slow.
-DEEP, DEEPER, APART = -1e5, -2e5, 1e3
+DEEP = -1e5
+DEEPER = -2e5
+APART = 1e3
 MANY = 8  # a model with more shapes than this has a twin with bodies of its own, see `Twin`
 
 
@@ -328,7 +330,8 @@ def _add_joint(
     # The axes of both frames, as columns, are the same in the start pose, so that every joint position is 0 there.
     axes = BALL_AXES if joint.kind == "ball" else np.eye(3)
     if joint.kind == "universal":
-        first, second = np.array(joint.axis), np.array(joint.axis2)
+        first = np.array(joint.axis)
+        second = np.array(joint.axis2)
         # Exactly orthogonal: the axes of a file are so only to a few digits.
         second = second - first * (first @ second)
         second /= math.sqrt(second @ second)

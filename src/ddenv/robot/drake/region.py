@@ -53,7 +53,8 @@ class Region:
 
     def with_place(self, place: Point, times: int) -> Region:
         """A region that extends also around `place` (m), `times` as far as around the way."""
-        starts, ends = np.vstack([self.starts, place]), np.vstack([self.ends, place])
+        starts = np.vstack([self.starts, place])
+        ends = np.vstack([self.ends, place])
         return Region(starts, ends, np.append(self.widths, times * WIDTH))
 
     def reaches(self, place: Point, radius: float) -> bool:

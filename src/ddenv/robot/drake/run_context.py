@@ -95,7 +95,8 @@ def _set(groups: Iterable[tuple[GeometryId, ...]]) -> GeometrySet:
 # Held joints are kept this far inside their limits (rad or m): a joint at its limit is work for the solver.
 INSIDE = 1e-6
 # Where models wait that are not simulated: this far from each other along x, and this high, m.
-APART, HIGH = 1e3, 1e5
+APART = 1e3
+HIGH = 1e5
 
 
 class Hold:
@@ -108,7 +109,9 @@ class Hold:
     """
 
     def __init__(self, built: Built, plant_context: Context, start: Floats) -> None:
-        self._plant, self._context, self.start = built.plant, plant_context, start
+        self._plant = built.plant
+        self._context = plant_context
+        self.start = start
         self._bodies = tuple(built.moving.values())
         self._count = built.plant.num_positions()
         self._held: Booleans = np.zeros(len(start), dtype=bool)
@@ -117,7 +120,8 @@ class Hold:
         low = cast(Floats, built.plant.GetPositionLowerLimits())
         high = cast(Floats, built.plant.GetPositionUpperLimits())
         inside = np.minimum(INSIDE, (high - low) / 4)
-        self._low, self._high = low + inside, high - inside
+        self._low = low + inside
+        self._high = high - inside
         self.away = start.copy()
         able = [built.robot, *(body for body in self._bodies if body.name in built.twins)]
         for number, body in enumerate(able):
@@ -126,7 +130,8 @@ class Hold:
 
     def entries(self, bodies: Iterable[Body]) -> Integers:
         """The indices (E,) of the positions and velocities of `bodies` in the plant's state."""
-        plant, found = self._plant, []
+        plant = self._plant
+        found = []
         for body in bodies:
             positions = to_drake(np.arange(self._count, dtype=float))
             found.append(plant.GetPositionsFromArray(body.instance, positions))
@@ -174,7 +179,8 @@ class Hold:
         """
         if not (self._bodies or self._changed):
             return
-        state, held = self.state(), self._held
+        state = self.state()
+        held = self._held
         if not np.array_equal(state[held], self._state[held]):
             state[held] = self._state[held]
             self._plant.SetPositionsAndVelocities(self._context, to_drake(state))
@@ -238,7 +244,10 @@ class RunContext:
 
     def __init__(self, built: Built, robot: Pose, clock: Clock, floor: float, region: Region | None = None) -> None:
         """Everything where it starts. `robot` takes the robot's own frame to the world frame."""
-        self.built, self.clock, self.floor, self.region = built, clock, floor, region
+        self.built = built
+        self.clock = clock
+        self.floor = floor
+        self.region = region
         self.diagram_context = built.diagram.CreateDefaultContext()
         self.plant_context = built.plant.GetMyMutableContextFromRoot(self.diagram_context)
         # The plant's default context has all models at the world's origin.

@@ -157,7 +157,8 @@ def corners_of(shape: Shape) -> list[Vector]:
             x, y, z = (max(side / 2 - CORNER_RADIUS, 0.0) for side in size)
             return [(sx * x, sy * y, sz * z) for sx in (-1, 1) for sy in (-1, 1) for sz in (-1, 1)]
         case Cylinder(radius, length):
-            inner, height = max(radius - CORNER_RADIUS, 0.0), max(length / 2 - CORNER_RADIUS, 0.0)
+            inner = max(radius - CORNER_RADIUS, 0.0)
+            height = max(length / 2 - CORNER_RADIUS, 0.0)
             angles = [math.tau * number / RIM_CORNERS for number in range(RIM_CORNERS)]
             return [(inner * math.cos(a), inner * math.sin(a), end * height) for end in (-1, 1) for a in angles]
         case Mesh():
@@ -170,12 +171,14 @@ def _mesh_corners(mesh: Mesh) -> list[Vector]:
     edges = mesh.vertices[mesh.faces[:, 1:]] - mesh.vertices[mesh.faces[:, :1]]
     normals = np.cross(edges[:, 0], edges[:, 1])
     areas = np.linalg.norm(normals, axis=1)
-    faces, normals = mesh.faces[areas > 0], normals[areas > 0] / areas[areas > 0, None]
+    faces = mesh.faces[areas > 0]
+    normals = normals[areas > 0] / areas[areas > 0, None]
     used = np.unique(faces)
     points = mesh.vertices[used]
     middle = points.mean(axis=0)
     # The first, then always the one farthest from all chosen ones.
-    taken, distances = [0], np.linalg.norm(points - points[0], axis=1)
+    taken = [0]
+    distances = np.linalg.norm(points - points[0], axis=1)
     while len(taken) < min(MESH_CORNERS, len(points)):
         taken.append(int(distances.argmax()))
         distances = np.minimum(distances, np.linalg.norm(points - points[taken[-1]], axis=1))

@@ -18,7 +18,8 @@ from ddenv.robot.deadline import Stopwatch
 from ddenv.text import printable
 
 SUPERVISOR = Path(__file__).with_name("supervise.py")
-BEGIN, END = b"+", b"."
+BEGIN = b"+"
+END = b"."
 PIECE = 65536
 TICK = 0.2  # how often a silent command is checked, s
 # The maximum time between two checks that counts, s: it is longer where we were stopped ourselves.
@@ -104,7 +105,8 @@ def running(words: Sequence[str], folder: Path, environment: Mapping[str, str], 
                 start_new_session=True,
                 bufsize=0,
             )
-        stdout, stderr = supervisor.stdout, supervisor.stderr
+        stdout = supervisor.stdout
+        stderr = supervisor.stderr
         assert stdout is not None and stderr is not None
         with stdout, stderr:
             try:
@@ -126,8 +128,10 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
     """
     complaints = Complaints()
     takers = ((command.stdout, take), (command.stderr, complaints.add))
-    limit, clock = seconds, Stopwatch(LONGEST_LOOK)
-    said, why = None, ""
+    limit = seconds
+    clock = Stopwatch(LONGEST_LOOK)
+    said = None
+    why = ""
     with selectors.DefaultSelector() as selector:
         selector.register(command.line, selectors.EVENT_READ)
         for stream, taker in takers:
@@ -146,7 +150,8 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
             late = f"took longer than {seconds:g} s of wall clock" if clock.look() > limit else ""
             if said is None and not why and (why := late or too_much()):
                 command.say(END)
-                limit, clock = STOP_WAIT, Stopwatch(LONGEST_LOOK)
+                limit = STOP_WAIT
+                clock = Stopwatch(LONGEST_LOOK)
             elif said is None and late:
                 # The supervisor itself was stopped, and will be killed.
                 said = ""

@@ -32,7 +32,8 @@ from ddenv.world.scenario import Scenario
 from ddenv.world.whole import whole_of
 from ddenv.world.write import without
 
-KEY, METHOD = "oracle.use", "run(world, seed, timeout)"
+KEY = "oracle.use"
+METHOD = "run(world, seed, timeout)"
 # The maximum time that the class may take to make an object, real s.
 LONGEST_START = 600.0
 ROW = "(time, pose) or (time, pose, poses by model)"
@@ -45,7 +46,8 @@ class PythonSimulator:
     def __init__(self, world: World, scenario: Scenario) -> None:
         """Raises UserError if there is no such class, or if it makes no object."""
         assert scenario.oracle is not None and scenario.oracle.use is not None
-        self._world, self._scenario = world, scenario
+        self._world = world
+        self._scenario = scenario
         self._removable = frozenset(world.elements(scenario.protected))
         self._names = frozenset(world.names)
         self._folder = start_folder(scenario).resolve()
@@ -141,7 +143,8 @@ class Poses:
 
     def __init__(self, models: Iterable[str], progress: Progress | None, links: Iterable[str] = ()) -> None:
         self.robot = PoseLog()
-        self._models, self._links = tuple(models), frozenset(links)
+        self._models = tuple(models)
+        self._links = frozenset(links)
         self._progress = progress
         self._logs: dict[str, PoseLog] = {}
         self._now: dict[str, PoseRow] = {}
@@ -154,7 +157,9 @@ class Poses:
         is_row = isinstance(row, tuple | list) and (len(row) == 2 or (len(row) == 3 and isinstance(row[2], Mapping)))
         if not is_row:
             raise BadLog(f"{where}: expected {ROW}, found {_shown(row)}")
-        t, pose, others = row[0], row[1], row[2] if len(row) == 3 else {}
+        t = row[0]
+        pose = row[1]
+        others = row[2] if len(row) == 3 else {}
         kept = self.robot.take(_numbers(t, pose, where), where)
         for name, its_pose in others.items():
             if name not in self._links:

@@ -43,7 +43,8 @@ class ExternalSimulator:
 
     def __init__(self, world: World, scenario: Scenario) -> None:
         """Raises UserError if the command cannot be started."""
-        self._world, self._scenario = world, scenario
+        self._world = world
+        self._scenario = scenario
         self._whole = whole_of(world, scenario)
         self._words = command_words(scenario)
         self._names = frozenset(world.names)
@@ -87,7 +88,8 @@ class ExternalSimulator:
         log = PoseLog(progress if file is None else None)
         whole = world.with_name(f"{world.name}.scenario.yaml")
         values = {"world": str(world), "scenario": str(whole), "seed": str(seed), "log": str(file or "/dev/stdout")}
-        words, environment = filled(self._words, values), self._environment(values)
+        words = filled(self._words, values)
+        environment = self._environment(values)
 
         def too_much() -> str:
             size = log.size
@@ -113,7 +115,8 @@ class ExternalSimulator:
 
     def _environment(self, values: dict[str, str]) -> dict[str, str]:
         """Our own environment, and what the command needs to know about the scenario."""
-        spawn, goal = self._scenario.robot.spawn, self._scenario.goal
+        spawn = self._scenario.robot.spawn
+        goal = self._scenario.goal
         known = {f"DDENV_{name.upper()}": value for name, value in values.items()}
         known["DDENV_TIMEOUT"] = f"{self._scenario.failure.timeout:.12g}"
         known["DDENV_SPAWN"] = _numbers(spawn.x, spawn.y, spawn.z, spawn.yaw)
@@ -134,7 +137,8 @@ class ExternalSimulator:
         if ended.code == 1 and ended.raised:
             return "error", f"the command ended with an exception{said}", self._rows(log)
         try:
-            outcome, rows = OUTCOMES[ended.code], log.finish()
+            outcome = OUTCOMES[ended.code]
+            rows = log.finish()
             timeout = self._scenario.failure.timeout
             if rows[-1, 0] > MUCH_LATER * timeout:
                 raise BadLog(
@@ -230,8 +234,10 @@ class PoseLog:
 
     def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
-        self._rest, self._problem = b"", ""
-        self._number, self._began = 0, False
+        self._rest = b""
+        self._problem = ""
+        self._number = 0
+        self._began = False
         self._rows: list[Row] = []
         self._last: Row | None = None
         self.size = 0
@@ -248,7 +254,8 @@ class PoseLog:
             if len(self._rest) > LONGEST_LINE:
                 self._line(self._rest)
         except BadLog as error:
-            self._problem, self._rest = str(error), b""
+            self._problem = str(error)
+            self._rest = b""
 
     def rows(self) -> Floats:
         """The rows so far: t (s), x, y, z (m), qw, qx, qy, qz, shape (N, 8)."""
@@ -262,7 +269,8 @@ class PoseLog:
 
     def finish(self) -> Floats:
         """All rows, shape (N, 8) with N > 0. Raises BadLog."""
-        rest, self._rest = self._rest, b""
+        rest = self._rest
+        self._rest = b""
         if rest:
             self.add(rest + b"\n")
         if self._problem:
@@ -282,10 +290,12 @@ class PoseLog:
             return
         fields = [field.strip() for field in text.split(",")]
         numbers = [number for field in fields if (number := _number(field)) is not None]
-        began, self._began = self._began, True
+        began = self._began
+        self._began = True
         if not began and not numbers:
             # A header may name eight columns as it likes, but must not name the quaternion's in another order.
-            turned, known = [field.lower() for field in fields[4:]], list(COLUMNS[4:])
+            turned = [field.lower() for field in fields[4:]]
+            known = list(COLUMNS[4:])
             if len(fields) != len(COLUMNS) or (sorted(turned) == sorted(known) and turned != known):
                 raise self._wrong(text)
             return

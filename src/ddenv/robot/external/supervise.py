@@ -22,7 +22,8 @@ from pathlib import Path
 # How long a command may take to end before it is killed, and how long its remaining processes are killed, s.
 GRACE = 2.0
 PATIENCE = 5.0
-PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # from Linux' <sys/prctl.h>
+PR_SET_PDEATHSIG = 1
+PR_SET_CHILD_SUBREAPER = 36  # from Linux' <sys/prctl.h>
 
 
 def main() -> None:

@@ -29,7 +29,8 @@ class Costmap:
         planner = setup.settings.planner
         self.resolution = planner.resolution
         self.count = max(round(planner.size / planner.resolution), 4)
-        self.spots, self.version = np.empty((3, 0)), 0
+        self.spots = np.empty((3, 0))
+        self.version = 0
         body = Footprint.of(setup)
         # One cell of the rim is kept: a robot that turns may still hit what is there.
         self._middle = (body.ahead - body.behind) / 2
@@ -58,7 +59,8 @@ class Costmap:
     def see(self, scan: Scan, estimate: Estimate, imu: Imu | None = None) -> None:
         """Adds what `scan` shows, and clears what its beams pass through; `estimate` and `imu` are the robot's pose and tilt."""
         if scan.angles is not self._angles:
-            self._angles, self._beams = scan.angles, np.stack([np.cos(scan.angles), np.sin(scan.angles)])
+            self._angles = scan.angles
+            self._beams = np.stack([np.cos(scan.angles), np.sin(scan.angles)])
             # The outermost beams, which have one neighbour only, clear nothing.
             self._far = np.zeros(len(scan.angles))
         # Nothing else of the scan is read: what ended the other beams takes no part in the run.
@@ -83,9 +85,12 @@ class Costmap:
         count = len(scan.angles)
         limits = np.full(count, (self.count / 2 + PASSED) * self.resolution + math.hypot(*scan.origin[:2]))
         if count > 2 and self.spots.size:
-            cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
-            dx, dy = self.spots[0] - estimate.x, self.spots[1] - estimate.y
-            x, y = cosine * dx + sine * dy - scan.origin[0], cosine * dy - sine * dx - scan.origin[1]
+            cosine = math.cos(estimate.heading)
+            sine = math.sin(estimate.heading)
+            dx = self.spots[0] - estimate.x
+            dy = self.spots[1] - estimate.y
+            x = cosine * dx + sine * dy - scan.origin[0]
+            y = cosine * dy - sine * dx - scan.origin[1]
             passed = np.sqrt(x * x + y * y) + PASSED * self.resolution + SPARE
             # A place is cleared by its nearest beam and both neighbours; which one is nearest may be a matter of rounding.
             beams = self._beams_at(scan, x, y) + np.arange(-2, 3)[:, None]
@@ -96,9 +101,12 @@ class Costmap:
 
     def _mark(self, scan: Scan, estimate: Estimate, roll: float, pitch: float) -> None:
         """Marks the cells in which beams end, but for those that end on the ground before a tilted robot."""
-        cr, sr = math.cos(roll), math.sin(roll)
-        cp, sp = math.cos(pitch), math.sin(pitch)
-        ch, sh = math.cos(estimate.heading), math.sin(estimate.heading)
+        cr = math.cos(roll)
+        sr = math.sin(roll)
+        cp = math.cos(pitch)
+        sp = math.sin(pitch)
+        ch = math.cos(estimate.heading)
+        sh = math.sin(estimate.heading)
         # From the robot's frame to the world frame.
         turn = np.array(
             [
@@ -139,8 +147,10 @@ class Costmap:
             gone |= (np.abs(spots[:2] - middle) > self.count * self.resolution / 2).any(axis=0)
         if level and len(scan.ranges) > 2:
             # What the nearest beam and both its neighbours have passed.
-            x, y = seen[0] + (self._middle - scan.origin[0]), seen[1] - scan.origin[1]
-            ranges, far = scan.ranges, self._far
+            x = seen[0] + (self._middle - scan.origin[0])
+            y = seen[1] - scan.origin[1]
+            ranges = scan.ranges
+            far = self._far
             np.minimum(ranges[1:-1], ranges[2:], out=far[1:-1])
             np.minimum(far[1:-1], ranges[:-2], out=far[1:-1])
             nearest = self._beams_at(scan, x, y)
@@ -148,7 +158,8 @@ class Costmap:
         if gone.any():
             self._hit[slots[gone]] = False
             kept: Booleans = ~gone
-            slots, spots = slots[kept], spots[:, kept]
+            slots = slots[kept]
+            spots = spots[:, kept]
         self._keep(slots, spots)
 
     def _beams_at(self, scan: Scan, x: Floats, y: Floats) -> Integers:
@@ -161,12 +172,14 @@ class Costmap:
 
     def _keep(self, slots: Integers, spots: Floats) -> None:
         same = len(slots) == len(self._slots) and bool((slots == self._slots).all())
-        self._slots, self.spots = slots, spots
+        self._slots = slots
+        self.spots = spots
         if same:
             return
         around: Booleans = np.zeros(self.count**2, dtype=bool)
         around[(slots + self._beside) % len(around)] = True
         if self._around[slots].all() and around[self._known].all():
             return
-        self._known, self._around = slots, around
+        self._known = slots
+        self._around = around
         self.version += 1

@@ -59,8 +59,10 @@ class Footprint:
 
 def seen_from(estimate: Estimate) -> Floats:
     """The matrix (3, 3) from the estimates' frame to the robot's frame, for points x, y (m) and 1."""
-    x, y = estimate.x, estimate.y
-    cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
+    x = estimate.x
+    y = estimate.y
+    cosine = math.cos(estimate.heading)
+    sine = math.sin(estimate.heading)
     return np.array([[cosine, sine, -cosine * x - sine * y], [-sine, cosine, sine * x - cosine * y], [0.0, 0.0, 1.0]])
 
 

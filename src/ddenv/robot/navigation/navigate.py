@@ -32,7 +32,8 @@ class Recovery:
     def __init__(self, setup: Setup) -> None:
         self._body = Footprint.of(setup)
         self._most = setup.settings.planner.recoveries
-        self._speed, self._rate = min(BACK_SPEED, setup.speed), setup.turn_rate
+        self._speed = min(BACK_SPEED, setup.speed)
+        self._rate = setup.turn_rate
         self.made = 0
 
     def begin(self, time: float, estimate: Estimate) -> bool:
@@ -40,7 +41,10 @@ class Recovery:
         if self.made >= self._most:
             return False
         self.made += 1
-        self._since, self._from, self._heading, self._turned = time, estimate, estimate.heading, 0.0
+        self._since = time
+        self._from = estimate
+        self._heading = estimate.heading
+        self._turned = 0.0
         return True
 
     def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
@@ -83,8 +87,10 @@ class Straight:
 
     def step(self, reading: Reading) -> Twist:
         """The command for the next period."""
-        setup, estimate = self._setup, reading.estimate
-        dx, dy = setup.goal[0] - estimate.x, setup.goal[1] - estimate.y
+        setup = self._setup
+        estimate = reading.estimate
+        dx = setup.goal[0] - estimate.x
+        dy = setup.goal[1] - estimate.y
         self.arrived = self.arrived or math.hypot(dx, dy) <= ARRIVED * setup.tolerance
         if self.arrived:
             return STOP
@@ -114,10 +120,13 @@ class Progress:
     def is_stalled(self, time: float, estimate: Estimate) -> bool:
         """Whether the robot at `estimate` has made no progress for too long at `time` (s)."""
         if self._from is None or math.hypot(estimate.x - self._from.x, estimate.y - self._from.y) >= MOVED:
-            self._from, self._moved = estimate, time
-            self._heading, self._turned = estimate.heading, time
+            self._from = estimate
+            self._moved = time
+            self._heading = estimate.heading
+            self._turned = time
         elif abs(wrap(estimate.heading - self._heading)) >= TURNED:
-            self._heading, self._turned = estimate.heading, time
+            self._heading = estimate.heading
+            self._turned = time
         return time - self._turned >= self._patience or time - self._moved >= ON_THE_SPOT * self._patience
 
 
@@ -160,7 +169,9 @@ class Navigator:
         self._near = self._map.spots
         # When (s) it looked, planned and found a path last; where, and on which version of the map, it planned.
         self._looked = self._planned = -math.inf
-        self._found, self._planned_at, self._planned_on = 0.0, setup.start[:2], -1
+        self._found = 0.0
+        self._planned_at = setup.start[:2]
+        self._planned_on = -1
         self._recovered: Point | None = None
         self._speed = 0.0
         self._recovers = self._blocked = self._waits = False
@@ -191,13 +202,15 @@ class Navigator:
             return
         self._looked = reading.time
         self._map.see(reading.scan, reading.estimate, self._imu)
-        spots, reach = self._map.spots, self._follower.reach
+        spots = self._map.spots
+        reach = self._follower.reach
         near = (np.abs(spots[0] - reading.estimate.x) < reach) & (np.abs(spots[1] - reading.estimate.y) < reach)
         self._near = spots[:, near]
         self._blocked = self._path is not None and self._planner.room(self._path, self._map.points) is None
 
     def _is_there(self, estimate: Estimate) -> bool:
-        goal, tolerance = self._setup.goal, self._setup.tolerance
+        goal = self._setup.goal
+        tolerance = self._setup.tolerance
         left = math.hypot(goal[0] - estimate.x, goal[1] - estimate.y)
         if left <= ARRIVED * tolerance:
             return True
@@ -206,7 +219,8 @@ class Navigator:
         return path is not None and path.final and path.left <= ARRIVED * tolerance and left <= tolerance
 
     def _follow(self, reading: Reading) -> Twist:
-        time, estimate = reading.time, reading.estimate
+        time = reading.time
+        estimate = reading.estimate
         self._think(time, estimate)
         if self._path is None:
             return self._try_to_recover(reading) if time - self._found >= THINK - TICK else STOP
@@ -214,7 +228,8 @@ class Navigator:
         if self._progress.is_stalled(time, estimate):
             return self._try_to_recover(reading)
         if self._recovered and math.dist((estimate.x, estimate.y), self._recovered) >= BETTER:
-            self._recovery.made, self._recovered = 0, None
+            self._recovery.made = 0
+            self._recovered = None
         return twist
 
     def _think(self, time: float, estimate: Estimate) -> None:
@@ -230,7 +245,8 @@ class Navigator:
             return
         if not is_due:
             return
-        self._planned, self._planned_on = time, self._map.version
+        self._planned = time
+        self._planned_on = self._map.version
         if not self._planner.is_best(self._path, self._map.points):
             self._plan(time, estimate)
 
@@ -241,21 +257,25 @@ class Navigator:
         return not path.final and path.left < TOO_SHORT
 
     def _plan(self, time: float, estimate: Estimate) -> None:
-        self._planned, self._planned_on = time, self._map.version
+        self._planned = time
+        self._planned_on = self._map.version
         self._planned_at = estimate.x, estimate.y
         path = self._planner.plan(self._map.points, estimate.x, estimate.y)
         if path is not None:
             self._found = time
             path.locate(estimate.x, estimate.y)
         if path is None or not self._is_as_good(path):
-            self._path, self._blocked = path, False
+            self._path = path
+            self._blocked = False
 
     def _is_as_good(self, other: Path) -> bool:
         """Whether the present path is hardly worse than `other`: a robot that keeps changing its plan swerves."""
-        path, points = self._path, self._map.points
+        path = self._path
+        points = self._map.points
         if path is None or self._is_spoilt(path) or path.off > SWAY or path.final < other.final:
             return False
-        room, others = self._planner.room(path, points), self._planner.room(other, points)
+        room = self._planner.room(path, points)
+        others = self._planner.room(other, points)
         return room is not None and room >= (others or 0.0) - CLOSER and path.left <= LONGER * other.left
 
     def _try_to_recover(self, reading: Reading) -> Twist:
@@ -267,7 +287,8 @@ class Navigator:
         twist = self._recovery.step(reading.time, reading.estimate, self._map)
         if twist is not None:
             return twist
-        self._recovers, self._path = False, None
+        self._recovers = False
+        self._path = None
         self._found = reading.time
         self._planned = -math.inf
         self._recovered = (reading.estimate.x, reading.estimate.y)

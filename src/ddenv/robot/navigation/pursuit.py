@@ -55,7 +55,8 @@ class Follower:
         self._points: Floats | None = None
         # An arc that was free, with room, is not tested again for this many steps.
         self._calm = round(CALM_FOR / setup.period)
-        self._left, self._room = 0, 0.0
+        self._left = 0
+        self._room = 0.0
         self.reach = self._body.circumscribed + self._look_ahead + ROOM + self._body.margin
         self._turning = self.stuck = False
 
@@ -68,7 +69,9 @@ class Follower:
         # A stopped robot waits for the next scan.
         if same and self.stuck and points is self._points:
             return STOP
-        self._path, self._points, self._turning = path, points, turning
+        self._path = path
+        self._points = points
+        self._turning = turning
         self._left = self._left - 1 if same else -1
         self.stuck = False
         if turning:
@@ -90,7 +93,8 @@ class Follower:
         """The distance (m) and the bearing (rad, from straight ahead) of the point that the robot aims at."""
         share = NEAREST + (1 - NEAREST) * min(max(estimate.speed / self._fastest, 0.0), 1.0)
         x, y = path.ahead(part * share * self._look_ahead)
-        dx, dy = x - estimate.x, y - estimate.y
+        dx = x - estimate.x
+        dy = y - estimate.y
         return math.hypot(dx, dy), wrap(math.atan2(dy, dx) - estimate.heading)
 
     def _drive(self, path: Path, distance: float, bearing: float, room: float) -> Twist:
@@ -137,7 +141,8 @@ def room(body: Footprint, points: Floats, estimate: Estimate, places: Floats) ->
     least = float(apart.min())
     if least >= 0:
         return least
-    now, nearest = apart[0], apart[1:].min(axis=0)
+    now = apart[0]
+    nearest = apart[1:].min(axis=0)
     may = np.minimum(now, np.maximum(np.minimum(now, 0.0) - GIVE, -body.margin))
     return None if (nearest < may).any() else 0.0
 

@@ -35,17 +35,22 @@ class Path:
     """
 
     def __init__(self, corners: list[Point], final: bool = True, back: float = 0.0, on: float = 0.0) -> None:
-        self.corners, self.final = corners, final
-        self.back, self.on, self.off = back, on, 0.0
+        self.corners = corners
+        self.final = final
+        self.back = back
+        self.on = on
+        self.off = 0.0
         self._legs = []
         for (x, y), end in pairwise(corners):
-            dx, dy = end[0] - x, end[1] - y
+            dx = end[0] - x
+            dy = end[1] - y
             length = math.hypot(dx, dy)
             cosine, sine = (dx / length, dy / length) if length else (1.0, 0.0)
             self._legs.append(Leg(x, y, cosine, sine, length))
         # The length of the path from the start of each leg.
         self._rests = list(accumulate(leg.length for leg in self._legs[::-1]))[::-1]
-        self._number, self._along = 0, 0.0
+        self._number = 0
+        self._along = 0.0
 
     @property
     def end(self) -> Point:
@@ -61,15 +66,19 @@ class Path:
         self.off = math.inf
         for number in range(self._number, min(self._number + 2, len(self._legs))):
             leg = self._legs[number]
-            dx, dy = x - leg.x, y - leg.y
+            dx = x - leg.x
+            dy = y - leg.y
             along = min(max(dx * leg.cosine + dy * leg.sine, 0.0), leg.length)
             off = math.hypot(dx - along * leg.cosine, dy - along * leg.sine)
             if off <= self.off:
-                self.off, self._number, self._along = off, number, along
+                self.off = off
+                self._number = number
+                self._along = along
 
     def ahead(self, distance: float) -> Point:
         """The place `distance` (m) further along it, or its end."""
-        number, along = self._number, self._along + distance
+        number = self._number
+        along = self._along + distance
         while along > self._legs[number].length and number + 1 < len(self._legs):
             along -= self._legs[number].length
             number += 1
@@ -150,7 +159,8 @@ class Planner:
 
     def __init__(self, setup: Setup) -> None:
         planner = setup.settings.planner
-        self._goal, self._tolerance = setup.goal, setup.tolerance
+        self._goal = setup.goal
+        self._tolerance = setup.tolerance
         self._body = Footprint.of(setup)
         self._side = self._body.side + planner.padding
         self._reach = max(self._body.ahead, self._body.behind)
@@ -235,7 +245,8 @@ class Planner:
 
     def _costs(self, points: Floats) -> tuple[Floats, Floats]:
         """The factors (4, cells) for `Grid.search`, and the distance of the nearest point to each cell (cells,), m."""
-        count, step = self._grid.count, self._step
+        count = self._grid.count
+        step = self._step
         widest = max(self._inflation, math.hypot(self._reach, self._side))
         around = np.arange(-math.ceil(widest / step), math.ceil(widest / step) + 1)
         cells = np.rint(points / step).astype(int)[:, :, None] + around
@@ -267,7 +278,8 @@ class Planner:
         kept = np.ones(len(places), dtype=bool)
         kept[1:-1] = turns | (np.arange(1, len(places) - 1) % APART == 0)
         chosen = np.flatnonzero(kept)
-        corners, at = [0], 0
+        corners = [0]
+        at = 0
         while at < len(chosen) - 1:
             ends = chosen[at + 1 :]
             starts = np.broadcast_to(places[chosen[at]], (len(ends), 2))
@@ -282,7 +294,8 @@ class Planner:
     def _ease(self, corners: Floats, points: Floats) -> Floats:
         """Moves `corners` (K, 2) m away from narrow places, so that the robot gets there aligned and leaves straight."""
         for number in range(1, len(corners) - 1):
-            sides, here = corners[[number - 1, number + 1]], corners[number]
+            sides = corners[[number - 1, number + 1]]
+            here = corners[number]
             _, near = legs_beside(points, sides, np.stack([here, here]), 0.0, 0.0, self._side)
             narrow = int(near.argmin())
             way = here - sides[narrow]
@@ -296,7 +309,8 @@ class Planner:
                 points, np.tile(tries, (2, 1)), ends, self._reach, np.repeat(on, len(tries)), self._side
             )
             # The cosines of the angles by which the path then turns there.
-            come, go = tries - sides[narrow], sides[1 - narrow] - tries
+            come = tries - sides[narrow]
+            go = sides[1 - narrow] - tries
             lengths = np.hypot(*come.T) * np.hypot(*go.T)
             cosines = (come * go).sum(axis=1) / np.maximum(lengths, 1e-9)
             good = free.reshape(2, -1).all(axis=0) & (cosines >= SHARPEST)

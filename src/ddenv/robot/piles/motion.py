@@ -136,11 +136,13 @@ def tight_gaps(a: Links, of_a: Motion, b: Links, of_b: Motion, wanted: Booleans)
     apart = np.full((len(a.bodies), len(b.bodies)), np.inf)
     rows, columns = np.nonzero(wanted[a.models][:, b.models])
     if len(rows):
-        turns, others_turns = of_a.turns[rows], of_b.turns[columns]
+        turns = of_a.turns[rows]
+        others_turns = of_b.turns[columns]
         way = np.einsum("nij,nj->ni", others_turns, b.centers[columns]) + of_b.places[columns]
         way = way - np.einsum("nij,nj->ni", turns, a.centers[rows]) - of_a.places[rows]
         # The 15 axes that can part two boxes.
-        own, others = np.swapaxes(turns, 1, 2), np.swapaxes(others_turns, 1, 2)
+        own = np.swapaxes(turns, 1, 2)
+        others = np.swapaxes(others_turns, 1, 2)
         crosses = np.cross(own[:, :, None], others[:, None]).reshape(len(way), 9, 3)
         lengths = np.linalg.norm(crosses, axis=2, keepdims=True)
         crosses = np.where(lengths > 1e-6, crosses / np.maximum(lengths, 1e-6), 0.0)

@@ -98,7 +98,8 @@ class Repertoire:
         near = frozenset(self._static)
         if script is not None:
             low, high = script.bounds()
-            low, high = low - margin, high + margin
+            low = low - margin
+            high = high + margin
             boxes = [(name, box) for name, box in self._static.items() if box]
             near = frozenset(name for name, box in boxes if (box[0] < high).all() and (low < box[1]).all())
         known = Known(names, near, near & present, script)
@@ -106,7 +107,8 @@ class Repertoire:
         # A pile that cannot be rehearsed takes memory, too: the names of all models that stay.
         self._size += 128 * len(near) + (0 if script is None else script.size)
         if self._size > MEMORY:
-            self._known, self._size = {}, 0
+            self._known = {}
+            self._size = 0
         return known
 
 
@@ -128,12 +130,15 @@ class Rehearsals:
         self._longest = max(LEAST, BUDGET / max(repertoire.moving, 1))
         context.hold.reset()
         # The gaps between all moving models (M, M), and from each to the robot (M,), at the start, m.
-        self._apart, self._to_robot = np.empty((0, 0)), np.empty(0)
+        self._apart = np.empty((0, 0))
+        self._to_robot = np.empty(0)
         if self._bodies:
-            links, robot = Links.of(self._bodies), Links.of([context.built.robot])
+            links = Links.of(self._bodies)
+            robot = Links.of([context.built.robot])
             there = links.observe(self._plant, context.plant_context, range(len(links.bodies)))
             here = robot.observe(self._plant, context.plant_context, range(len(robot.bodies)))
-            self._apart, self._to_robot = gaps(links, there, links, there), gaps(robot, here, links, there)[0]
+            self._apart = gaps(links, there, links, there)
+            self._to_robot = gaps(robot, here, links, there)[0]
 
     def learn(self, present: frozenset[str]) -> None:
         """Lets the repertoire know the piles of the whole world, with the models `present`, which this plant has."""
@@ -173,13 +178,15 @@ class Rehearsals:
         context.presence.remove(frozenset())
         places: dict[str, tuple[Pose, ...]] = {}
         found: dict[str, set[str]] = {"restless": set(), "fallen": set(), "broken": set()}
-        ticks, seconds = context.clock.ticks, 0.0
+        ticks = context.clock.ticks
+        seconds = 0.0
         for pile, script in self._settle(present):
             if script is None:
                 found["broken"].update(_names(pile))
                 continue
             seconds = max(seconds, ticks[len(script.states) - 1].time)
-            last, first = script.motions[-1], 0
+            last = script.motions[-1]
+            first = 0
             gone = last.below(context.floor)
             for body, rests in zip(pile, script.resting, strict=True):
                 links = range(first, first := first + len(body.links))
@@ -205,7 +212,8 @@ class Rehearsals:
         `present` are the models of the world. What rests on something that is no element, and so always stays, rests on what that
         rests on.
         """
-        hold, presence = self._context.hold, self._context.presence
+        hold = self._context.hold
+        presence = self._context.presence
         presence.remove(frozenset())
         settled = self._settle(present)
         hold.begin(others=(self._context.built.robot,))
@@ -227,7 +235,8 @@ class Rehearsals:
             presence.part(self._bodies, ())
         pairs = set()
         for upper in elements & set(below):
-            reached, ahead = set[str](), set(below[upper])
+            reached = set[str]()
+            ahead = set(below[upper])
             while ahead:
                 one = ahead.pop()
                 reached.add(one)
@@ -242,7 +251,8 @@ class Rehearsals:
         model_of = {shape: name for name, identities in built.shapes() for shape in identities}
         query = cast(QueryObject, built.plant.get_geometry_query_input_port().Eval(self._context.plant_context))
         for contact in query.ComputePointPairPenetration():
-            first, second = model_of.get(contact.id_A), model_of.get(contact.id_B)
+            first = model_of.get(contact.id_A)
+            second = model_of.get(contact.id_B)
             # The normal points from the second to the first.
             up = contact.nhat_BA_W[2]
             upper, lower = (first, second) if up > 0 else (second, first)
@@ -252,7 +262,9 @@ class Rehearsals:
     def _meetings(self, settled: Sequence[tuple[tuple[Body, ...], Script | None]]) -> Booleans:
         """Which moving models (M, M) of two piles come near each other: by the boxes around all that a pile passes through."""
         count = len(self._bodies)
-        low, high, pile_of = np.full((count, 3), np.inf), np.full((count, 3), -np.inf), np.full(count, -1)
+        low = np.full((count, 3), np.inf)
+        high = np.full((count, 3), -np.inf)
+        pile_of = np.full(count, -1)
         number_of = {body.name: number for number, body in enumerate(self._bodies)}
         for pile, (bodies, script) in enumerate(settled):
             members = [number_of[body.name] for body in bodies]
@@ -268,7 +280,8 @@ class Rehearsals:
 
     def _piles(self, numbers: Sequence[int], joined: Booleans, left: Booleans) -> list[tuple[Body, ...]]:
         """The moving models `numbers` (K,) in the groups that `joined` (K, K) makes of them; only groups that are `left` (K,)."""
-        left, piles = left.copy(), []
+        left = left.copy()
+        piles = []
         while left.any():
             one = np.zeros_like(left)
             one[left.argmax()] = True
@@ -279,7 +292,9 @@ class Rehearsals:
 
     def _rehearse(self, pile: tuple[Body, ...], present: frozenset[str]) -> Known:
         """Simulates the pile alone until all of it rests or its time is up; there is no script if the simulation breaks."""
-        context, script, margin = self._context, None, NEAR
+        context = self._context
+        script = None
+        margin = NEAR
         context.diagram_context.SetTime(0.0)
         sleep = Sleep(context, pile, (), alone=True)
         try:
@@ -297,12 +312,15 @@ class Rehearsals:
         return self._repertoire.add(_names(pile), present, script, margin)
 
     def _rows(self, pile: tuple[Body, ...], sleep: Sleep) -> Script:
-        built, plant_context = self._context.built, self._context.plant_context
+        built = self._context.built
+        plant_context = self._context.plant_context
         entries = self._context.hold.entries(pile)
         motors = self._plant.get_desired_state_input_port(built.robot.instance)
         motors.FixValue(plant_context, np.zeros(motors.size()))
         simulator = Simulator(built.diagram, self._context.diagram_context)
-        states, motions, paces = [], [], []
+        states = []
+        motions = []
+        paces = []
         for tick in self._context.clock.ticks:
             if tick.step:
                 simulator.AdvanceTo(tick.time)

@@ -44,12 +44,20 @@ class Sleep:
         never: bool = False,
         alone: bool = False,
     ) -> None:
-        hold, clock = context.hold, context.clock
-        self._plant, self._context = context.built.plant, context.plant_context
-        self._presence, self._hold, self._twins = context.presence, hold, context.twins
-        self._period, self._step, self._floor = clock.period, clock.step, context.floor
-        self._kept, self._never = kept, never
-        self._links, self._robot = Links.of(kept), Links.of([context.built.robot])
+        hold = context.hold
+        clock = context.clock
+        self._plant = context.built.plant
+        self._context = context.plant_context
+        self._presence = context.presence
+        self._hold = hold
+        self._twins = context.twins
+        self._period = clock.period
+        self._step = clock.step
+        self._floor = context.floor
+        self._kept = kept
+        self._never = never
+        self._links = Links.of(kept)
+        self._robot = Links.of([context.built.robot])
         self._entries = [hold.entries([body]) for body in kept]
         number_of = {body.name: number for number, body in enumerate(kept)}
         self._scripts = [(script, [number_of[name] for name in script.names]) for script in scripts]
@@ -101,7 +109,8 @@ class Sleep:
 
     def boxes(self) -> Bounds:
         """The lowest and the highest corners, (M, 3) m each, of the boxes around the kept models at the last tick."""
-        low, high = self.motion.low, self.motion.high
+        low = self.motion.low
+        high = self.motion.high
         return np.minimum.reduceat(low, self._links.first), np.maximum.reduceat(high, self._links.first)
 
     def awake_links(self) -> tuple[Floats, Floats, Floats]:
@@ -164,7 +173,8 @@ class Sleep:
         links = self._links.of_models(models)
         if not links:
             return
-        before, now = self.motion.of(links), self._links.observe(self._plant, self._context, links)
+        before = self.motion.of(links)
+        now = self._links.observe(self._plant, self._context, links)
         self.motion.put(links, now)
         if seconds:
             self.pace[links] = self._links.ways(links, before, now) / seconds
@@ -296,7 +306,8 @@ class Loads:
     """The loads of M models in one run, from each of them and, last, from the robot."""
 
     def __init__(self, context: RunContext, models: Sequence[Body]) -> None:
-        built, count = context.built, len(models)
+        built = context.built
+        count = len(models)
         self._context = context.plant_context
         self._port = built.plant.get_contact_results_output_port()
         movers = [*(body.geometry for body in models), built.robot.geometry]
@@ -331,7 +342,8 @@ class Loads:
         """Which models (M,) bear so much more, or are carried so much less, than at rest that they wake."""
         self._mean += min(1.0, seconds / SMOOTH) * (self._forces() - self._mean)
         change = np.where(self._known[..., None], self._mean - self._at_rest, 0.0).sum(axis=1)
-        before, now = self._at_rest @ self._up, self._mean @ self._up
+        before = self._at_rest @ self._up
+        now = self._mean @ self._up
         lost = self._known & (before > CARRIES * self._weights[:, None]) & (now < LOST * before)
         self._change = np.linalg.norm(change, axis=1)
         return (self._change > self._bears) | lost.any(axis=1)

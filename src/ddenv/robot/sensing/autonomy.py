@@ -64,7 +64,8 @@ class SensorSuite:
 
     def imu(self, truth: Truth) -> Imu:
         """The measured turn rate, roll and pitch."""
-        settings, noise = self._settings, self._imu
+        settings = self._settings
+        noise = self._imu
         return Imu(
             yaw_rate=truth.yaw_rate + self._rate_bias + settings.gyro * next(noise),
             roll=truth.roll + settings.tilt * next(noise),
@@ -73,7 +74,9 @@ class SensorSuite:
 
     def odometry(self, wheels: Sequence[float]) -> tuple[float, ...]:
         """The measured speeds of the wheels, rad/s; a wheel that slips is not distinguished from one that grips."""
-        scale, spread, noise = self._scale, self._settings.odometry, self._odometry
+        scale = self._scale
+        spread = self._settings.odometry
+        noise = self._odometry
         return tuple([speed * (scale + spread * next(noise)) for speed in wheels])
 
 
@@ -95,10 +98,14 @@ class Filter:
     """
 
     def __init__(self, x: float, y: float, heading: float, sensors: Sensors) -> None:
-        self._x, self._y, self._heading, self._bias = x, y, wrap(heading), 0.0
+        self._x = x
+        self._y = y
+        self._heading = wrap(heading)
+        self._bias = 0.0
         self._speed = self._rate = 0.0
         self._compass_variance = sensors.compass**2 + SMALLEST**2
-        gyro, wheels = sensors.gyro**2 + SMALLEST**2, SKIDDING**2
+        gyro = sensors.gyro**2 + SMALLEST**2
+        wheels = SKIDDING**2
         self._trust = wheels / (gyro + wheels)
         self._rate_variance = gyro * wheels / (gyro + wheels)
         # The upper half of the covariance of x, y, heading h and bias b.
@@ -121,17 +128,24 @@ class Filter:
         rate = trust * (gyro_rate - self._bias) + (1.0 - trust) * wheel_rate
         level = speed * math.cos(pitch)
         middle = self._heading + rate * seconds / 2
-        cosine, sine = math.cos(middle), math.sin(middle)
+        cosine = math.cos(middle)
+        sine = math.sin(middle)
         way = level * seconds
         self._x += way * cosine
         self._y += way * sine
         self._heading = wrap(self._heading + rate * seconds)
-        self._speed, self._rate = level, rate
+        self._speed = level
+        self._rate = rate
         # The Jacobian: how an error of the heading and of the bias grows into the other errors.
-        xh, yh, hb = -way * sine, way * cosine, -trust * seconds
-        xb, yb = xh * hb / 2, yh * hb / 2
+        xh = -way * sine
+        yh = way * cosine
+        hb = -trust * seconds
+        xb = xh * hb / 2
+        yb = yh * hb / 2
         # The covariance P becomes F P F^T, where F is the identity except for these five entries.
-        hh, h_b, bb = self._hh, self._hb, self._bb
+        hh = self._hh
+        h_b = self._hb
+        bb = self._bb
         # The rows of F P for x, y and h, in the columns that are needed.
         x_h = self._xh + xh * hh + xb * h_b
         x_b = self._xb + xh * h_b + xb * bb
@@ -140,8 +154,10 @@ class Filter:
         self._xx += xh * (self._xh + x_h) + xb * (self._xb + x_b)
         self._xy += xh * self._yh + xb * self._yb + yh * x_h + yb * x_b
         self._yy += yh * (self._yh + y_h) + yb * (self._yb + y_b)
-        self._xh, self._xb = x_h + hb * x_b, x_b
-        self._yh, self._yb = y_h + hb * y_b, y_b
+        self._xh = x_h + hb * x_b
+        self._xb = x_b
+        self._yh = y_h + hb * y_b
+        self._yb = y_b
         self._hh = hh + hb * (2 * h_b + hb * bb)
         self._hb = h_b + hb * bb
         along = (SLIPPING * way) ** 2
@@ -155,12 +171,18 @@ class Filter:
         """The correction by the heading that the compass measures, `compass` (rad)."""
         surprise = wrap(compass - self._heading)
         total = self._hh + self._compass_variance
-        kx, ky, kh, kb = self._xh / total, self._yh / total, self._hh / total, self._hb / total
+        kx = self._xh / total
+        ky = self._yh / total
+        kh = self._hh / total
+        kb = self._hb / total
         self._x += kx * surprise
         self._y += ky * surprise
         self._heading = wrap(self._heading + kh * surprise)
         self._bias += kb * surprise
-        xh, yh, hh, hb = self._xh, self._yh, self._hh, self._hb
+        xh = self._xh
+        yh = self._yh
+        hh = self._hh
+        hb = self._hb
         self._xx -= kx * xh
         self._xy -= kx * yh
         self._xh -= kx * hh
@@ -175,7 +197,9 @@ class Filter:
 
 def setup_of(robot: Model, drive: Drive, clock: Clock, scenario: Scenario, seed: int = 0) -> Setup:
     """What the controller of a run with this seed knows before it starts."""
-    settings, goal, spawn = scenario.controller, scenario.goal, scenario.robot.spawn
+    settings = scenario.controller
+    goal = scenario.goal
+    spawn = scenario.robot.spawn
     return Setup(
         goal=(goal.x, goal.y),
         tolerance=goal.tolerance,
@@ -215,9 +239,11 @@ class Autonomy:
         self._suite = suite
         self._left = [number for number, left in enumerate(drive.left) if left]
         self._right = [number for number, left in enumerate(drive.left) if not left]
-        self._drive, self._skid = drive, scenario.controller.skid
+        self._drive = drive
+        self._skid = scenario.controller.skid
         self._step = clock.step
-        self._controller, self._listener = controller, listener
+        self._controller = controller
+        self._listener = listener
         spawn = scenario.robot.spawn
         self._filter = Filter(spawn.x, spawn.y, spawn.yaw, scenario.sensors)
         self._advanced = 0
@@ -260,7 +286,8 @@ class Autonomy:
 
     def command(self, tick: Tick) -> Twist | WheelSpeeds:
         """The controller's command, valid until the next one. Raises BadCode."""
-        new, self._new = self._new, {}
+        new = self._new
+        self._new = {}
         reading = Reading(tick.time, self._filter.estimate, **new)
         command = self._controller.step(reading)
         if self._listener is not None:

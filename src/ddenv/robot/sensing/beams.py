@@ -139,7 +139,8 @@ def _extent(shape: Shape) -> tuple[Vector, Vector]:
 # Added to divisors that may be 0: a beam along a face then crosses it, but far away. It is too small to change anything else.
 NEVER = 1e-200
 # In how many steps a beam is followed along terrain.
-FEWEST_STEPS, MOST_STEPS = 20, 200
+FEWEST_STEPS = 20
+MOST_STEPS = 200
 SHORTEST = 1e-9  # the minimum half length of a capsule's straight part, as a part of its radius
 
 Interval = tuple[Floats, Floats]
@@ -148,7 +149,8 @@ Interval = tuple[Floats, Floats]
 def cube(start: Floats, way: Floats) -> Interval:
     """The cube from -1 to 1; with fewer than three rows, what lies between -1 and 1 along these axes alone."""
     metres = 1.0 / (way + NEVER)
-    middle, half = start * metres, np.abs(metres)
+    middle = start * metres
+    half = np.abs(metres)
     return -(middle + half).min(axis=0), (half - middle).min(axis=0)
 
 
@@ -172,7 +174,8 @@ def tube(start: Floats, way: Floats) -> Interval:
 
 def pill(start: Floats, way: Floats, lengths: Floats) -> Interval:
     """The capsule about the third axis whose half length is `lengths` (P,) times its radius."""
-    start, way = start.copy(), way.copy()
+    start = start.copy()
+    way = way.copy()
     start[2] *= lengths
     way[2] *= lengths
     ends = np.maximum(lengths - 1.0, SHORTEST)
@@ -210,7 +213,8 @@ class Facets:
         start, second, third = (corners[mesh.faces[:, number]] for number in range(3))
         normals = np.cross(second - start, third - start)
         sizes = np.sqrt((normals * normals).sum(axis=1))
-        faces, normals = mesh.faces[sizes > 0], normals[sizes > 0] / sizes[sizes > 0, None]
+        faces = mesh.faces[sizes > 0]
+        normals = normals[sizes > 0] / sizes[sizes > 0, None]
         # A sliver's normal may be wrong: with this offset its face still cuts off no vertex.
         offsets = (normals @ corners.T).max(axis=1)
         return cls(corners.T.copy(), faces.T.copy(), normals.T.copy(), offsets)
@@ -287,7 +291,8 @@ class Fan:
 
     def between(self, middle: Floats, half: Floats) -> tuple[Integers, Integers]:
         """The beams within `half` (K,) rad of the angles `middle` (K,) rad: how many for each (K,), and the numbers of all (P,)."""
-        number, width = (middle - self.angles[0] + TURNS) / self.step, half / self.step
+        number = (middle - self.angles[0] + TURNS) / self.step
+        width = half / self.step
         first = np.maximum(np.ceil(number - width), 0.0).astype(int).T.ravel()
         last = np.minimum(np.floor(number + width), len(self.angles) - 1.0).astype(int).T.ravel()
         counts = np.maximum(last - first + 1, 0)
@@ -315,7 +320,9 @@ def cast(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> tuple[Floats
     enter, leave = _cross(fan, shapes, local, counts, beams)
     np.minimum(leave, fan.range, out=leave)
     (met,) = ((enter >= 0) & (enter <= leave)).nonzero()
-    beams, enter, numbers = beams[met], enter[met], np.arange(len(counts)).repeat(counts)[met]
+    beams = beams[met]
+    enter = enter[met]
+    numbers = np.arange(len(counts)).repeat(counts)[met]
     distances = np.full(len(fan.angles), np.inf)
     np.minimum.at(distances, beams, enter)
     first = enter == distances[beams]

@@ -39,7 +39,8 @@ class Lidar:
     ) -> None:
         self._settings = settings
         self._mount = Pose((settings.x, settings.y, settings.z))
-        self._random, self._state = random, random.bit_generator.state
+        self._random = random
+        self._state = random.bit_generator.state
         self._turns = 0
         self._fan = Fan.of(settings)
         self._names = obstacles.names
@@ -50,7 +51,8 @@ class Lidar:
 
         there = np.array([name in present for name in obstacles.names], dtype=bool)
         (rows,) = there[obstacles.owners].nonzero()
-        self._owners, self._shapes = obstacles.owners[rows], obstacles.shapes.take(rows)
+        self._owners = obstacles.owners[rows]
+        self._shapes = obstacles.shapes.take(rows)
         (self._movers,) = (obstacles.links[rows] >= 0).nonzero()
         firsts = accumulate((len(model.links) for model in moving), initial=0)
         first = {model.name: first for model, first in zip(moving, firsts, strict=False)}
@@ -92,7 +94,8 @@ class Lidar:
         if limits is not None:
             # Behind a hit that is too far the next one is farther, with the same noise: that would not be seen either.
             near: Booleans = measured <= limits
-            ranges, owners = np.where(near, ranges, np.inf), owners[near[beams]]
+            ranges = np.where(near, ranges, np.inf)
+            owners = owners[near[beams]]
         self._read[owners] = np.minimum(self._read[owners], now)
         return ranges
 
@@ -152,7 +155,8 @@ def in_the_way(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> Intege
     ahead, left, above = axes @ (shapes.centers - origin[:, None])
     far = shapes.reaches + fan.range
     numbers: Integers = ((np.abs(above) <= shapes.reaches) & (ahead * ahead + left * left <= far * far)).nonzero()[0]
-    frames, away = shapes.frames.take(numbers, axis=2), origin[:, None] - shapes.centers.take(numbers, axis=1)
+    frames = shapes.frames.take(numbers, axis=2)
+    away = origin[:, None] - shapes.centers.take(numbers, axis=1)
     local = (away[:, None] * frames).sum(axis=0)
     up = (axes[2][:, None, None] * frames).sum(axis=0)
     # Half the edges of the boxes around the shapes, and their centers, along the lidar's vertical axis.

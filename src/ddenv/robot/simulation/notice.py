@@ -35,7 +35,9 @@ class Notice:
         """
         self.first_touched: dict[str, float] = {}
         self._first_seen: dict[str, float] = {}
-        self._sensors, self._context, self._sleep = sensors, context.plant_context, sleep
+        self._sensors = sensors
+        self._context = context.plant_context
+        self._sleep = sleep
         built = context.built
         self._contacts = built.plant.get_contact_results_output_port()
         self._robot = frozenset(one.get_value() for one in built.robot.geometry)
@@ -61,21 +63,26 @@ class Notice:
             return
         for number in range(results.num_point_pair_contacts()):
             pair = results.point_pair_contact_info(number).point_pair()
-            name, other = self._owners.get(pair.id_A.get_value()), pair.id_B
+            name = self._owners.get(pair.id_A.get_value())
+            other = pair.id_B
             if name is None:
-                name, other = self._owners.get(other.get_value()), pair.id_A
+                name = self._owners.get(other.get_value())
+                other = pair.id_A
             # Most contacts are with the ground that the robot stands on: they fail the cheaper checks, which come first.
             if name is not None and name not in self.first_touched and other.get_value() in self._robot:
                 self.first_touched[name] = now
 
     def look(self, now: float, place: Vector, heading: float) -> None:
         """Notes what is in view at the time `now` (s) from `place` (m), in the direction `heading` (rad)."""
-        sensors, unseen = self._sensors, self._unseen
+        sensors = self._sensors
+        unseen = self._unseen
         if not (sensors.view_range and unseen.any()):
             return
         low, high = self._sleep.boxes()
-        low, high = np.vstack([self._low, low]), np.vstack([self._high, high])
-        eye, direction = np.array(place), np.array(heading)
+        low = np.vstack([self._low, low])
+        high = np.vstack([self._high, high])
+        eye = np.array(place)
+        direction = np.array(heading)
         seen = in_view(low[unseen], high[unseen], eye, direction, sensors.view_range, sensors.view_angle)
         for name in self._names[unseen][seen]:
             self._first_seen.setdefault(name, now)
@@ -105,8 +112,10 @@ def in_view(low: Floats, high: Floats, eye: Floats, heading: Floats, view_range:
     seen: Booleans = np.asarray(apart <= view_range)
     if view_angle >= math.tau:
         return seen
-    eye, heading = np.broadcast_to(eye, low.shape)[seen], np.broadcast_to(heading, seen.shape)[seen]
-    low, high = low[seen] - eye, high[seen] - eye
+    eye = np.broadcast_to(eye, low.shape)[seen]
+    heading = np.broadcast_to(heading, seen.shape)[seen]
+    low = low[seen] - eye
+    high = high[seen] - eye
     drop = np.maximum(np.maximum(low[:, 2], -high[:, 2]), 0.0)
     x, y = np.clip(0.0, low[:, :2], high[:, :2]).T
     offset = np.arctan2(y, x) - heading

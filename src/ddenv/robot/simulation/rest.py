@@ -25,7 +25,9 @@ class Rest:
     """
 
     def __init__(self, ends: Ends, goal: Goal, until: float) -> None:
-        self._ends, self._goal, self._until = ends, goal, until
+        self._ends = ends
+        self._goal = goal
+        self._until = until
         self._since = 0.0
         self._place: Vector | None = None
         # The greatest distance from there so far, m.
@@ -40,7 +42,9 @@ class Rest:
             self._place = None
             return False
         if self._place is None:
-            self._since, self._place, self._slid = now, place, 0.0
+            self._since = now
+            self._place = place
+            self._slid = 0.0
         self._slid = max(self._slid, math.dist(place, self._place))
         rested = now - self._since
         # Times are sums of steps: 2 s may come out 1e-15 s short.

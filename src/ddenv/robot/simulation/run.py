@@ -58,7 +58,8 @@ class Run:
 
     def __post_init__(self) -> None:
         built = self.context.built
-        plant, base = built.plant, built.robot.base
+        plant = built.plant
+        base = built.robot.base
         motors = plant.get_desired_state_input_port(built.robot.instance)
         # The motors ignore the wheels' desired positions, which come first, and follow their desired speeds.
         self._commanded = np.zeros(motors.size())
@@ -85,7 +86,8 @@ class Run:
         if outcome == "failed":
             whole = np.vstack([trajectory, [self.context.clock.seconds, *trajectory[-1, 1:]]]) if cut else trajectory
             failure = kind_of(whole, fell=failure == "fell", arrived=self.autonomy.arrived)
-        seen, took_part = self.lidar.first_seen if self.lidar else {}, None
+        seen = self.lidar.first_seen if self.lidar else {}
+        took_part = None
         if self.reached and outcome != "error":
             read = self.lidar.took_part if self.lidar else {}
             took_part = self.reached.names | self.sleep.took_part | read.keys() | self.unusual
@@ -108,7 +110,9 @@ class Run:
 
     def _loop(self, progress: Progress) -> tuple[str, str, bool, float]:
         """The outcome, the failure, whether the run was cut short, and when (s) it ended."""
-        sleep, notice, lidar = self.sleep, self.notice, self.lidar
+        sleep = self.sleep
+        notice = self.notice
+        lidar = self.lidar
         for tick in self.context.clock.ticks:
             problem = self._simulate(tick.time) if tick.step else ""
             if problem:
@@ -224,7 +228,9 @@ class Run:
         qw, qx, qy, qz = pose[3:]
         roll, pitch, heading = Pose(pose[:3], pose[3:]).rpy()
         # The gyro is fixed to the body: it measures the rotation about the body's own z axis, here in the world frame.
-        up_x, up_y, up_z = 2 * (qx * qz + qw * qy), 2 * (qy * qz - qw * qx), 1 - 2 * (qx * qx + qy * qy)
+        up_x = 2 * (qx * qz + qw * qy)
+        up_y = 2 * (qy * qz - qw * qx)
+        up_z = 1 - 2 * (qx * qx + qy * qy)
         wx, wy, wz = self._state[self._spin : self._spin + 3]
         wheels = tuple([sign * self._state[start] for start, sign in self._wheels])
         return Truth(heading, roll, pitch, up_x * wx + up_y * wy + up_z * wz, wheels)

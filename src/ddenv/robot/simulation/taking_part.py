@@ -42,7 +42,9 @@ class Reached:
     def __init__(
         self, boxes: Mapping[str, Bounds], hull: Hull, sleep: Sleep, present: frozenset[str], period: float
     ) -> None:
-        self._hull, self._sleep, self._period = hull, sleep, period
+        self._hull = hull
+        self._sleep = sleep
+        self._period = period
         there = {name: box for name, box in boxes.items() if name in present}
         self._names = np.array([*there], dtype=object)
         # The shapes of models that were not reached yet.
@@ -88,8 +90,10 @@ class Reached:
         if not len(low):
             return
         margin = (SLACK + speed * self._period)[:, None]
-        low, high = low - margin, high + margin
-        lowest, highest = low.min(axis=0), high.max(axis=0)
+        low = low - margin
+        high = high + margin
+        lowest = low.min(axis=0)
+        highest = high.max(axis=0)
         near: Booleans = (self._low <= highest).all(axis=1) & (self._high >= lowest).all(axis=1)
         meets = (low[:, None] <= self._high[near]) & (self._low[near] <= high[:, None])
         near[near] = meets.all(axis=2).any(axis=0)
@@ -101,7 +105,9 @@ class Reached:
             return
         self._found[self._owners[near]] = True
         others = ~self._found[self._owners]
-        self._owners, self._low, self._high = self._owners[others], self._low[others], self._high[others]
+        self._owners = self._owners[others]
+        self._low = self._low[others]
+        self._high = self._high[others]
 
 
 def _moved(one: PoseRow, other: PoseRow, reach: float) -> float:
@@ -127,7 +133,8 @@ class Hull:
     @classmethod
     def of(cls, robot: Model) -> Hull:
         low, high = stacked(_boxes(robot))
-        centers, halves = (low + high) / 2, (high - low) / 2
+        centers = (low + high) / 2
+        halves = (high - low) / 2
         return cls(centers, halves, float(np.linalg.norm(np.abs(centers) + halves, axis=1).max(initial=0.0)))
 
     def bounds(self, place: Pose) -> Bounds:
@@ -140,7 +147,8 @@ class Hull:
 
 def _boxes(robot: Model) -> Iterator[Bounds]:
     """The box around each link, wherever its joints take it."""
-    frame, first = robot.links[0].pose.inverse(), robot.links[0].pose.position
+    frame = robot.links[0].pose.inverse()
+    first = robot.links[0].pose.position
     # For each link that joints connect with the first one: its joint's place, and the distance there along the joints, m.
     chains = {robot.links[0].name: (first, 0.0)}
     # A file may name its joints in any order.
@@ -161,10 +169,12 @@ def _boxes(robot: Model) -> Iterator[Bounds]:
             continue
         held = joint_of.get(link.name)
         if held is not None and held.parent in rigid:
-            center, far = held.pose.position, _slide(held)
+            center = held.pose.position
+            far = _slide(held)
         else:
             # Several joints in a row: a ball around the first link.
-            center, far = first, chains[link.name][1] if link.name in chains else math.inf
+            center = first
+            far = chains[link.name][1] if link.name in chains else math.inf
         start = held.pose.position if held is not None else link.pose.position
         corner = float(np.linalg.norm(np.abs(box).max(axis=0)))
         far = min(ENDLESS, far + math.dist(start, link.pose.position) + corner)

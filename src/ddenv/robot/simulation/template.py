@@ -46,13 +46,15 @@ class Template:
 
     def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
         """Raises UserError for a robot or a controller that cannot drive, and for a world that Drake cannot simulate."""
-        spawn, goal = scenario.robot.spawn, scenario.goal
+        spawn = scenario.robot.spawn
+        goal = scenario.goal
         self._whole = whole_of(world, scenario)
         # Boxes in place of planes, large enough for all models, the spawn and the goal.
         self._solid = with_ground_boxes(
             world, self._whole.corners, [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)]
         )
-        self._robot, self._scenario = robot, scenario
+        self._robot = robot
+        self._scenario = scenario
         self._drive = find_drive(robot, scenario.robot.wheels)
         self._controllers = controllers(scenario.controller, scenario.folder)
         names = frozenset(world.names)
@@ -65,7 +67,8 @@ class Template:
         self._boxes = still_boxes(world)
         # False only to measure what sleeping saves: then all moving models are always simulated.
         self._sleeping = True
-        self._solids, self._hull = solids(self._solid), Hull.of(robot)
+        self._solids = solids(self._solid)
+        self._hull = Hull.of(robot)
         self._reach = self._hull.reach + YIELD
         # What decides in a run is known: no controller of the user's, and no model that collides with itself. (Where slices were
         # used beside such models, 23 of 274 implied tests differed.)
@@ -143,7 +146,8 @@ class Template:
         """
         if unknown := keep - self.names:
             raise ValueError(f"no such model: {min(unknown)}")
-        context, scenario = self.context, self._scenario
+        context = self.context
+        scenario = self._scenario
         removed = self.names - keep - self._always
         kept = [body for name, body in context.built.moving.items() if name not in removed]
         present = self.names - removed
@@ -155,7 +159,9 @@ class Template:
         scripts = [known.script for known in piles if known.script is not None]
         sleep = Sleep(context, kept, scripts, never=not self._sleeping)
         try:
-            suite, lidar, reached = SensorSuite(scenario.sensors, seed), None, None
+            suite = SensorSuite(scenario.sensors, seed)
+            lidar = None
+            reached = None
             if scenario.sensors.lidar and self._obstacles:
                 movers = [self._models[body.name] for body in kept]
                 lidar = Lidar(scenario.sensors.lidar, self._obstacles, present, movers, suite.lidar)

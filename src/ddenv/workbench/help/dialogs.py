@@ -21,7 +21,8 @@ class Reading(ModalScreen[None]):
 
     def __init__(self, title: str, groups: Iterable[tuple[str, Iterable[tuple[str | Text, str | Text]]]]) -> None:
         super().__init__()
-        self._title, self._groups = title, groups
+        self._title = title
+        self._groups = groups
 
     def compose(self) -> ComposeResult:
         table = Table.grid(padding=(0, 2))
@@ -44,7 +45,11 @@ class Pick(ModalScreen[int | None]):
 
     def __init__(self, title: str, does: str, lines: Sequence[Text], *, head: Text | None = None, at: int = 0) -> None:
         super().__init__()
-        self._title, self._does, self._lines, self._head, self._at = title, does, lines, head, at
+        self._title = title
+        self._does = does
+        self._lines = lines
+        self._head = head
+        self._at = at
 
     def compose(self) -> ComposeResult:
         with Framed(self._title, f"enter {self._does}   escape closes"):
@@ -68,7 +73,8 @@ class SideBySide(ModalScreen[None]):
 
     def __init__(self, title: str, lines: Iterable[tuple[str, str, str]]) -> None:
         super().__init__()
-        self._title, self._lines = title, lines
+        self._title = title
+        self._lines = lines
 
     def compose(self) -> ComposeResult:
         table = Table.grid(padding=(0, 2), expand=True)

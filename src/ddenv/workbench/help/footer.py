@@ -36,7 +36,8 @@ class KeyFooter(Keys):
 
     def __init__(self, first: Sequence[str], instead: Callable[[], Sequence[str]] = tuple) -> None:
         super().__init__()
-        self._first, self._instead = first, instead
+        self._first = first
+        self._instead = instead
         self._words: dict[str, tuple[str, str]] = {}
         self.entries: tuple[Entry, ...] = ()
         self._due = False

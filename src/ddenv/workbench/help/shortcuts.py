@@ -18,7 +18,9 @@ from ddenv.workbench.help.key_names import shown
 from ddenv.workbench.shared.bindings import keys
 
 _FOCUS = "to the next or previous pane, field or button"
-_LINE, _PAGE, _END = "one line up or down", "one page up or down", "to the first or the last line"
+_LINE = "one line up or down"
+_PAGE = "one page up or down"
+_END = "to the first or the last line"
 _TAKE = "choose the line under the cursor"
 # Textual's own actions that are worth a line in the help.
 TEXTUAL_WORDS = {
@@ -70,10 +72,13 @@ def groups(screen: Screen[Any]) -> list[Group]:
     for active in filter(_words, screen.active_bindings.values()):
         of_app = isinstance(active.node, App) or (active.node is screen and not active.binding.id)
         (everywhere if of_app else own if active.node is screen else panes).append(active)
-    pane, title, hints = screen.focused, "Here", ""
+    pane = screen.focused
+    title = "Here"
+    hints = ""
     if pane is not None:
         titles = (str(each) for node in pane.ancestors_with_self if (each := getattr(node, "border_title", None)))
-        title, hints = plain(next(titles, title)), (pane.HELP or "") if "HELP" in vars(type(pane)) else ""
+        title = plain(next(titles, title))
+        hints = (pane.HELP or "") if "HELP" in vars(type(pane)) else ""
     found = [
         Group(title, _merged(panes), tuple(plain(line) for line in hints.splitlines() if line.strip())),
         Group("This screen", _merged(own)),
@@ -93,7 +98,8 @@ def _merged(found: Iterable[ActiveBinding]) -> tuple[Shortcut, ...]:
         same.setdefault(active.binding.id or _words(active), []).append(active)
     shortcuts = []
     for active, *more in same.values():
-        binding, keys = active.binding, shown(",".join(each.binding.key for each in (active, *more)))
+        binding = active.binding
+        keys = shown(",".join(each.binding.key for each in (active, *more)))
         id = binding.id or ""
         shortcuts.append(Shortcut(keys, _words(active), binding.action, active.node, id, active.enabled))
     return tuple(shortcuts)

@@ -17,7 +17,9 @@ from ddenv.learn.variables import Variable
 from ddenv.text import plain, truncated
 
 # The widths of what stands before an entry of a list, an answer, and a remark on it: longer lines go on below the words.
-BULLET, ANSWER, REMARK = 2, 6, 4
+BULLET = 2
+ANSWER = 6
+REMARK = 4
 STYLES = {"": "", "strong": "bold", "emphasis": "italic", "code": "bold"}
 CHANGED = "▸"
 WIDTH = 15
@@ -127,7 +129,8 @@ def _hung(text: Text, indent: int, room: int) -> Text:
 
 def plain_words(words: str) -> str:
     """Without control characters; a space at an end stays."""
-    lead, tail = words[:1] == " ", words[-1:] == " "
+    lead = words[:1] == " "
+    tail = words[-1:] == " "
     return f"{' ' if lead else ''}{plain(words)}{' ' if tail and words.strip() else ''}"
 
 
@@ -166,7 +169,8 @@ class Variables(Widget):
         self.refresh()
 
     def render(self) -> Text:
-        text, room = Text(no_wrap=True), max(8, self.size.width - WIDTH - 3)
+        text = Text(no_wrap=True)
+        room = max(8, self.size.width - WIDTH - 3)
         for one in self._variables:
             style = "bold" if one.changed else ""
             text.append(f"{CHANGED if one.changed else ' '} {one.name:<{WIDTH}} ", style or "dim")

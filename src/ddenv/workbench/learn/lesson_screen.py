@@ -82,19 +82,24 @@ class LessonScreen(LearnScreen[bool]):
         `following` is the title of the next lesson, or "".
         """
         super().__init__()
-        self._run, self._opened, self._following = run, opened, following
+        self._run = run
+        self._opened = opened
+        self._following = following
         self._file = Observed(run)
         self._moments = Moments(self._file)
         if opened is None:
-            position, score = Position(self._file.events), None
+            position = Position(self._file.events)
+            score = None
             position.catch_up()
             if not position.ids:
                 raise UserError(f"{run}: has no events yet")
         else:
-            position, score = opened.position, all_scores().get(opened.lesson.name)
+            position = opened.position
+            score = all_scores().get(opened.lesson.name)
         self.course = Course(position, opened, score)
         self._kept = self.course.score
-        self._map, self._legend = WorldMap(id="lesson-map"), MapLines(id="lesson-legend")
+        self._map = WorldMap(id="lesson-map")
+        self._legend = MapLines(id="lesson-legend")
 
     def body(self) -> ComposeResult:
         with Container(id="lesson-body"):
@@ -117,7 +122,8 @@ class LessonScreen(LearnScreen[bool]):
 
     def _show(self) -> None:
         self._show_run()
-        course, page = self.course, self.course.page
+        course = self.course
+        page = self.course.page
         ended = self._opened is not None and course.step == course.last
         if ended:
             following = f"\n\n`enter` opens the next lesson: **{self._following}**." if self._following else ""
@@ -125,7 +131,8 @@ class LessonScreen(LearnScreen[bool]):
             page = replace(page, after=blocks(done))
         self.query_one(LessonPane).show(page)
         self._show_heading()
-        footer, due = self.query_one(KeyFooter), course.due and not course.is_open
+        footer = self.query_one(KeyFooter)
+        due = course.due and not course.is_open
         asked = page.question if page.chosen is None else None
         # The pane *Algorithm* comes with the first step that speaks of it; where none does, it is shown from the start.
         steps = () if self._opened is None else self._opened.lesson.steps
@@ -182,7 +189,8 @@ class LessonScreen(LearnScreen[bool]):
         self.query_one("#lesson-now").border_subtitle = f"moment {number} of {all_moments}"
 
     def _show_heading(self) -> None:
-        course, score = self.course, self.course.score
+        course = self.course
+        score = self.course.score
         left = f" {plain(self._run.stem)}, step by step"
         if self._opened is not None:
             last = course.step == course.last
@@ -244,12 +252,15 @@ class LessonScreen(LearnScreen[bool]):
             self.say("there is no hint here")
 
     def action_activity(self) -> None:
-        course, opened = self.course, self._opened
-        here, moment = course.here, course.position.moment(course.at)
+        course = self.course
+        opened = self._opened
+        here = course.here
+        moment = course.position.moment(course.at)
         if opened is None or here is None or moment is None or course.activity is None:
             self.say("there is nothing to try here")
             return
-        base, attempt = self._moments.of(moment, ""), course.attempt
+        base = self._moments.of(moment, "")
+        attempt = course.attempt
 
         def keep(attempt: Attempt) -> None:
             course.keep(attempt)

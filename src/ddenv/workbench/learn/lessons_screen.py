@@ -68,7 +68,8 @@ class LessonsScreen(LearnScreen[None]):
 
     def _fill(self, at: int | None = None) -> None:
         """The list, with the lesson number `at` under the cursor, or the one where it is."""
-        options, scores = self.query_one(OptionList), all_scores()
+        options = self.query_one(OptionList)
+        scores = all_scores()
         at = (options.highlighted or 0) if at is None else at
         done = sum(scores.get(lesson.name, Score()).done for lesson in self._lessons)
         heading = Text(" Lessons", "bold").append(f" · {done} of {len(self._lessons)} done", "not bold")

@@ -22,11 +22,16 @@ from ddenv.workbench.run.snapshot import Moments
 from ddenv.workbench.shared.bindings import HELP, keys
 from ddenv.workbench.shared.observed import Observed
 
-IN, OUT, GONE = "■", "□", "·"
+IN = "■"
+OUT = "□"
+GONE = "·"
 # Time between two tests while the race runs, s.
 PACE = 0.7
 # Rows: a racer without a map, the fewest with one, the panel below besides its line for each racer, header and footer.
-BARE, WITH_MAP, SAID, AROUND = 5, 11, 6, 2
+BARE = 5
+WITH_MAP = 11
+SAID = 6
+AROUND = 2
 LEGEND = "■ there  □ left out  · gone   ● f  ◇ other  ○ goal   ✓ done"
 # What the tests were good for; the rest is rare.
 COLUMNS = {"f showed": "f showed", "part without f": "part alone", "rest without f": "without a part", "again": "again"}
@@ -38,7 +43,8 @@ class RacerPane(Vertical):
 
     def __init__(self, play: Play, base: Snapshot) -> None:
         super().__init__(classes="panel")
-        self.play, self._base = play, base
+        self.play = play
+        self._base = base
         self.map = WorldMap()
         self.map.can_focus = False
         self._said = Static("", markup=False)
@@ -48,11 +54,15 @@ class RacerPane(Vertical):
         yield self._said
 
     def show(self, race: Race) -> None:
-        play, turn, tests = self.play, race.now(self.play), min(race.at, self.play.tests)
-        left, room = play.after(tests), max(8, self.size.width - 2)
+        play = self.play
+        turn = race.now(self.play)
+        tests = min(race.at, self.play.tests)
+        left = play.after(tests)
+        room = max(8, self.size.width - 2)
         # The map says itself what a panel's lower border has, so the figures stand above.
         done = race.is_done(play)
-        stopped, ended = done and not play.ended, done and play.ended
+        stopped = done and not play.ended
+        ended = done and play.ended
         figures = f" · {count(tests, 'test')}{', stopped' if stopped else ''} · {len(left)} left{' ✓' if ended else ''}"
         # As text: a name may look like markup.
         self.border_title = Text(shortened(plain(play.name), max(6, room - 4 - len(figures))) + figures)
@@ -61,7 +71,8 @@ class RacerPane(Vertical):
         signs = "".join(SIGNS.get(each.outcome, "?") for each in play.turns[:tests])
         what = plain(play.method) or f"{count(len(play.begins), 'model')}, no test yet"
         if turn is not None:
-            candidate, again = turn.candidate, ", again" if turn.again else ""
+            candidate = turn.candidate
+            again = ", again" if turn.again else ""
             what = f"{candidate.label}{again}: {count(candidate.size, 'model')} {SIGNS.get(turn.outcome, '?')}"
         last = signs if len(signs) <= room else f"…{signs[-(room - 1) :]}"
         self._said.update(Text(f"{truncated(what, room)}\n{_bar(play.begins, frozenset(left), there, room)}\n{last}"))
@@ -95,7 +106,8 @@ class RaceScreen(LearnScreen[None]):
 
     def __init__(self, plays: Sequence[Play], bases: Sequence[Snapshot], run: Path) -> None:
         super().__init__()
-        self.race, self._run = Race(tuple(plays)), run
+        self.race = Race(tuple(plays))
+        self._run = run
         self._panes = [RacerPane(play, base) for play, base in zip(plays, bases, strict=True)]
 
     def body(self) -> ComposeResult:
@@ -128,7 +140,8 @@ class RaceScreen(LearnScreen[None]):
         each = (height - AROUND - SAID - len(self._panes)) // rows
         maps = each >= WITH_MAP
         body = self.query_one("#race-body")
-        body.styles.grid_size_columns, body.styles.grid_size_rows = columns, rows
+        body.styles.grid_size_columns = columns
+        body.styles.grid_size_rows = rows
         body.styles.height = rows * (each if maps else BARE)
         for pane in self._panes:
             pane.map.display = maps
@@ -149,7 +162,8 @@ class RaceScreen(LearnScreen[None]):
         heads = {kind: f"  {head}" for kind, head in COLUMNS.items()}
         said = Text(f"{'':<{width}}{'tests':>7}{''.join(heads.values())}", "dim", no_wrap=True)
         for play in race.plays:
-            numbers, name = spent(play, race.at), shortened(plain(play.name), width)
+            numbers = spent(play, race.at)
+            name = shortened(plain(play.name), width)
             cells = "".join(f"{numbers[kind] or '':>{len(head)}}" for kind, head in heads.items())
             said.append(f"\n{name:<{width}}{min(race.at, play.tests):>7}{cells}", "not dim")
         if race.over:
@@ -185,7 +199,8 @@ class RaceScreen(LearnScreen[None]):
 
 def race_of_runs(runs: Sequence[Path]) -> RaceScreen:
     """The searches of two to four run files. Raises UserError, also if they are not of one world."""
-    plays, bases = plays_of_runs(runs), []
+    plays = plays_of_runs(runs)
+    bases = []
     for run in runs:
         with Observed(run) as file:
             position = position_in(file.events())

@@ -54,7 +54,10 @@ class TryScreen(LearnScreen[None]):
         self, run: Path, base: Snapshot, attempt: Attempt, plays: tuple[Play, ...], keep: Callable[[Attempt], None]
     ) -> None:
         super().__init__()
-        self._run, self._base, self._plays, self._keep = run, base, plays, keep
+        self._run = run
+        self._base = base
+        self._plays = plays
+        self._keep = keep
         self.attempt = attempt
         self._map = WorldMap(id="try-map")
         self._asked = False
@@ -80,12 +83,15 @@ class TryScreen(LearnScreen[None]):
         header.append(f" · {len(attempt.held)} of {count(len(attempt.oracle.models), 'model')} kept", "not bold")
         header.append(f" · {attempt.tests_left} of {count(attempt.budget, 'test')} left", "not bold")
         self.query_one("#try-header", Static).update(header)
-        tests, table = self.query_one("#try-tests", VerticalScroll), self.query_one("#try-table", Static)
+        tests = self.query_one("#try-tests", VerticalScroll)
+        table = self.query_one("#try-table", Static)
         if attempt.ended:
-            tests.border_title, tests.border_subtitle = "Side by side", ""
+            tests.border_title = "Side by side"
+            tests.border_subtitle = ""
             table.update(_side_by_side(list(comparison(attempt.oracle, self._plays, attempt)), tests.size.width))
         else:
-            tests.border_title, tests.border_subtitle = "Your tests", "● f  ◇ other  ○ goal"
+            tests.border_title = "Your tests"
+            tests.border_subtitle = "● f  ◇ other  ○ goal"
             rows = [_row(number, each) for number, each in enumerate(attempt.tried, 1)]
             table.update(Text("\n").join(rows or [Text(NO_TESTS)]))
             tests.scroll_end(animate=False)
@@ -95,7 +101,9 @@ class TryScreen(LearnScreen[None]):
         self.refresh_bindings()
 
     def _say_where(self) -> None:
-        said, attempt, many = self.query_one("#try-said", Static), self.attempt, count(len(self.attempt.held), "model")
+        said = self.query_one("#try-said", Static)
+        attempt = self.attempt
+        many = count(len(self.attempt.held), "model")
         if attempt.ended:
             verdict = Text(f"{'✓' if attempt.found else '✗'} {plain(attempt.verdict)}", "bold")
             said.update(
@@ -109,7 +117,8 @@ class TryScreen(LearnScreen[None]):
             last = attempt.tried[-1]
             what = SAID[last.outcome].format(out=_names(last.out), held=many)
             first = f"Test {len(attempt.tried)}: {SIGNS[last.outcome]} {what}"
-        marked, models = self._map.selection, Text("Kept: ")
+        marked = self._map.selection
+        models = Text("Kept: ")
         for name in attempt.held:
             sign = "*" if name in marked else ""
             word = Text(f"{sign}{shortened(plain(name), LONGEST_NAME)}", "bold reverse" if sign else "bold")
@@ -155,7 +164,8 @@ class TryScreen(LearnScreen[None]):
         self._map.select(self._map.selection ^ {self.attempt.oracle.models[place]})
 
     def action_test(self, only: bool) -> None:
-        marked, held = self._map.selection, frozenset(self.attempt.held)
+        marked = self._map.selection
+        held = frozenset(self.attempt.held)
         if not marked:
             self.say("mark some models first: space, or a click on the map")
             return

@@ -21,7 +21,10 @@ LIGHT_STRENGTH = STRENGTH | {KEPT: 0.88, LEFT_OUT: 0.30, PINNED: 0.80}
 NEUTRAL: RGB = (128, 140, 160)
 YELLOW: RGB = (255, 215, 80)
 # How much of the text's colour removed models, robots beside the foremost one, and the two paths have.
-FAINT, DULL, ORIGINAL, PATH = 0.35, 0.5, 0.55, 0.8
+FAINT = 0.35
+DULL = 0.5
+ORIGINAL = 0.55
+PATH = 0.8
 # Background and text that a theme of the terminal's own colours may have: it does not say which these are.
 OWN: dict[bool, tuple[RGB, RGB]] = {True: ((15, 20, 27), (213, 219, 229)), False: ((246, 248, 251), (28, 35, 45))}
 
@@ -62,7 +65,8 @@ class Palette:
             strength = STRENGTH[kind]
             # On a light background a bright hue would not be seen.
             if luminance(packed(self.ground)) > 128:
-                hue, strength = blend(hue, (0, 0, 0), 0.4), LIGHT_STRENGTH[kind]
+                hue = blend(hue, (0, 0, 0), 0.4)
+                strength = LIGHT_STRENGTH[kind]
             fill = packed(blend(self.ground, hue, strength))
         return Tone(SOLID[kind], fill, fill, packed(blend(unpacked(fill), self.ground, 0.5)))
 

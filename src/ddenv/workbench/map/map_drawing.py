@@ -107,7 +107,8 @@ class MapDrawing:
         """Adds to the paths behind the robots that drive now."""
         self._trails = {live.test: self._trails.get(live.test, []) for live in snapshot.live}
         for live in snapshot.live:
-            trail, point = self._trails[live.test], (live.pose[0], live.pose[1])
+            trail = self._trails[live.test]
+            point = (live.pose[0], live.pose[1])
             if trail[-1:] != [point]:
                 trail.append(point)
 
@@ -126,7 +127,8 @@ class MapDrawing:
                 if way.robot is not None:
                     robots.append((way.robot, color, signs))
         else:
-            ids, dull = _in_focus(shown.snapshot), palette.shade(DULL)
+            ids = _in_focus(shown.snapshot)
+            dull = palette.shade(DULL)
             trails = self._trails if "path" in shown.layers else {}
             for one in shown.snapshot.live:
                 color = palette.live if one.test in ids or not ids else dull
@@ -147,7 +149,8 @@ class MapDrawing:
         """The last one again if only the crosshair or the focus moved."""
         of = shown, view, palette
         if self._picture is None or self._of is None or any(a is not b for a, b in zip(of, self._of, strict=True)):
-            self._of, self._picture = of, _still(*of)
+            self._of = of
+            self._picture = _still(*of)
         return self._picture
 
     def _with_live(self, shown: Shown) -> Shown:
@@ -191,7 +194,8 @@ def _still(shown: Shown, view: View, palette: Palette) -> Picture:
             marks[cell] = sign, ground
     cells = place_signs(grid, centers, how.signs, marks)
     for index, (row, column) in cells.items():
-        text, tone = how.signs.texts[index], how.looks[how.tones[index]]
+        text = how.signs.texts[index]
+        tone = how.looks[how.tones[index]]
         canvas.put((row, column), text, back=tone.fill)
         written[row, column : column + len(text)] = True
     for cell, (sign, ground) in marks.items():
@@ -205,7 +209,9 @@ def _still(shown: Shown, view: View, palette: Palette) -> Picture:
 
 def _names(drawn: Picture, prints: Sequence[Footprint], near: Point | None) -> None:
     """Writes the names of kept models beside their signs: the nearest to the place `near` first, then the largest; none overlap."""
-    canvas, written, view = drawn.canvas, drawn.written, drawn.view
+    canvas = drawn.canvas
+    written = drawn.written
+    view = drawn.view
     kept = np.flatnonzero(drawn.how.kinds != REMOVED).tolist()
     away = {index: round(prints[index].distance(near), 1) if near else 0.0 for index in kept}
     for index in sorted(kept, key=lambda index: (away[index], -prints[index].area)):
@@ -225,7 +231,8 @@ def _room(drawn: Picture, at: tuple[int, int], text: str, sign: int) -> tuple[in
     """The row and column for a name beside a sign of so many cells, or on the model without one; None where there is no room."""
     begins = ((0, sign + 1), (0, -len(text) - 1), (-1, 0), (1, 0)) if sign else ((0, 0), (-1, 0), (1, 0))
     for down, right in begins:
-        row, column = at[0] + down, at[1] + right
+        row = at[0] + down
+        column = at[1] + right
         if not (0 <= row < drawn.view.rows and 0 <= column <= drawn.view.columns - len(text)):
             continue
         # With a free cell on each side names stay apart.
@@ -235,7 +242,8 @@ def _room(drawn: Picture, at: tuple[int, int], text: str, sign: int) -> tuple[in
 
 
 def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:
-    layers, snapshot = shown.layers, shown.snapshot
+    layers = shown.layers
+    snapshot = shown.snapshot
     signs = {"f": palette.failure, "goal": palette.goal}
     limits = [(ring, signs.get(verdict, palette.shade(DULL)), 0) for verdict, ring in shown.limits]
     if shown.ways or limits:
@@ -254,7 +262,8 @@ def _path(rows: array[float] | None) -> np.ndarray:
 
 def _crosshair(canvas: Canvas, cell: Cell, written: np.ndarray, palette: Palette) -> None:
     rows, columns = canvas.chars.shape
-    row, column = min(cell[0], rows - 1), min(cell[1], columns - 1)
+    row = min(cell[0], rows - 1)
+    column = min(cell[1], columns - 1)
     for (down, right), sign in ARMS:
         place = row + down, column + right
         if 0 <= place[0] < rows and 0 <= place[1] < columns:

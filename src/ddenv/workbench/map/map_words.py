@@ -46,14 +46,19 @@ SOLID, DASHED, ROBOTS, PARTED = OF_WAYS = (
     (PARTING, "paths diverge"),
 )
 LIMITS = ("▭", "limits")
-LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
+LONGEST_NAME = 40
+LONGEST_DROPPED = 16
+SHORT_DROPPED = 10
 # The first signs of `LEGEND` are places, which no map goes without. Two cells apart, they need so many cells.
-PLACES, GAP, WITH_GAPS = 3, 2, 28
+PLACES = 3
+GAP = 2
+WITH_GAPS = 28
 
 
 def legend(shown: Shown, width: int, lines: int = 2) -> Text:
     """The signs on the map with their meanings, as many as fit: first where the robot starts, has to go and ended."""
-    state, layers = shown.snapshot.state, shown.layers
+    state = shown.snapshot.state
+    layers = shown.layers
     meanings = {
         PARTS: state.round is not None and "partitions" in layers,
         SELECTED: bool(shown.selection),
@@ -65,7 +70,9 @@ def legend(shown: Shown, width: int, lines: int = 2) -> Text:
     }
     signs = [sign for sign, there in meanings.items() if there]
     usual = (*LEGEND[:PLACES], *signs, *LEGEND[PLACES:]) if state.elements else LEGEND[:2]
-    text, used, gap = Text(no_wrap=True, overflow="ellipsis"), 0, GAP if width >= WITH_GAPS else 1
+    text = Text(no_wrap=True, overflow="ellipsis")
+    used = 0
+    gap = GAP if width >= WITH_GAPS else 1
     if shown.ways or shown.limits:
         ways = ((sign, way.name) for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False))
         rare = (LIMITS if shown.limits else None, PARTED if shown.parting else None, shown.apart)
@@ -97,7 +104,8 @@ def _sensed(state: RunState) -> list[tuple[str, float]]:
 
 def describe(state: RunState, each: Footprint, columns: int = 0) -> Text:
     """Name, part, size, distance to f and time first sensed, as much as fits in `columns` (0: all). Names are shortened."""
-    width, depth = each.high[0] - each.low[0], each.high[1] - each.low[1]
+    width = each.high[0] - each.low[0]
+    depth = each.high[1] - each.low[1]
     shaped = bool(each.polygons) and math.isfinite(width + depth)
     words = [_standing(state, each.name), f"{width:.3g} x {depth:.3g} m" if shaped else "no shapes"]
     if state.f_position is not None:
@@ -129,15 +137,19 @@ class MapLines(Widget):
 
     def __init__(self, only_signs: bool = False, *, id: str) -> None:
         super().__init__(id=id)
-        self._only_signs, self._shown = only_signs, Shown()
+        self._only_signs = only_signs
+        self._shown = Shown()
 
     def show(self, shown: Shown) -> None:
         self._shown = shown
         self.refresh()
 
     def render(self) -> Text:
-        width, shown, text = self.size.width, self._shown, Text(no_wrap=True)
-        state, longest = shown.snapshot.state, LONGEST_DROPPED if width > 44 else SHORT_DROPPED
+        width = self.size.width
+        shown = self._shown
+        text = Text(no_wrap=True)
+        state = shown.snapshot.state
+        longest = LONGEST_DROPPED if width > 44 else SHORT_DROPPED
         if self._only_signs:
             return legend(shown, width)
         if shown.selection:

@@ -75,7 +75,10 @@ class Kept:
 
 def kept(shown: Shown) -> Kept:
     """What the map needs of a run's state, and how models stand out in the layers that are shown."""
-    state, layers, candidate, place = shown.snapshot.state, shown.layers, shown.candidate, shown.place
+    state = shown.snapshot.state
+    layers = shown.layers
+    candidate = shown.candidate
+    place = shown.place
     met = in_last(state) if "participants" in layers else None
     standing = frozenset(candidate.models) if candidate else None
     return Kept(
@@ -158,26 +161,31 @@ def fill(canvas: Canvas, grid: np.ndarray, how: Looks) -> None:
     fills = np.array([*(each.fill for each in how.looks), ground], dtype=np.int32)
     inks = np.array([*(each.ink for each in how.looks), ground], dtype=np.int32)
     glyphs = np.array([ord(char) for char in (*(each.glyph for each in how.looks), " ")], dtype=np.uint32)
-    upper, lower = tone[grid[0::2]], tone[grid[1::2]]
+    upper = tone[grid[0::2]]
+    lower = tone[grid[1::2]]
     whole = upper == lower
     canvas.chars[:] = np.where(whole, glyphs[upper], ord("▀"))
     canvas.fore[:] = np.where(whole, inks[upper], fills[upper])
     canvas.back[:] = np.where(whole, fills[upper], fills[lower])
     # The terminal's own colour can only be the background of a block.
     under = ~whole & (grid[0::2] == EMPTY)
-    canvas.chars[under], canvas.fore[under], canvas.back[under] = ord("▄"), fills[lower[under]], ground
+    canvas.chars[under] = ord("▄")
+    canvas.fore[under] = fills[lower[under]]
+    canvas.back[under] = ground
     _seams(canvas, grid, tone, how)
 
 
 def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> None:
     pixels = tone[grid]
-    beside, above = np.zeros(grid.shape, dtype=bool), np.zeros(grid.shape, dtype=bool)
+    beside = np.zeros(grid.shape, dtype=bool)
+    above = np.zeros(grid.shape, dtype=bool)
     beside[:, :-1] = (pixels[:, :-1] == pixels[:, 1:]) & (grid[:, :-1] != grid[:, 1:])
     above[1:] = (pixels[:-1] == pixels[1:]) & (grid[:-1] != grid[1:])
     solid = np.array([*(each.glyph != " " for each in how.looks), False])
     seams = np.array([*(each.seam for each in how.looks), 0], dtype=np.int32)
     fills = np.array([*(each.fill for each in how.looks), 0], dtype=np.int32)
-    upper, lower = pixels[0::2], pixels[1::2]
+    upper = pixels[0::2]
+    lower = pixels[1::2]
     full = solid[upper] & (upper == lower)
     # The background of a full block is invisible: one style for all makes a row of few pieces of text.
     block = full & (canvas.chars == ord("█"))
@@ -186,7 +194,8 @@ def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> No
         canvas.chars[where & block] = ord(char)
     halved = full & above[1::2]
     canvas.chars[halved] = ord("─")
-    canvas.fore[halved], canvas.back[halved] = seams[upper[halved]], fills[upper[halved]]
+    canvas.fore[halved] = seams[upper[halved]]
+    canvas.back[halved] = fills[upper[halved]]
     # Between protected platforms, too: a gap between them may be narrower than a pixel, and what the failure is about.
     protected = canvas.chars == ord(SOLID[PROTECTED])
     for where, line in ((above[0::2], "▔"), (beside[0::2] | beside[1::2], "▕")):

@@ -99,7 +99,8 @@ class Shown:
     @property
     def same_paths(self) -> bool:
         """Whether the last similar run has the same path as f: before the first reduction it is f."""
-        original, evidence = self.snapshot.original, self.snapshot.evidence
+        original = self.snapshot.original
+        evidence = self.snapshot.evidence
         return original is None or original == evidence
 
 
@@ -142,7 +143,8 @@ def place_of(world: World, scenario: Scenario | None = None) -> Place:
     place = Place(footprints(world), elements=frozenset(world.elements(protected)), movable=movable)
     if scenario is None:
         return place
-    spawn, goal = scenario.robot.spawn, scenario.goal
+    spawn = scenario.robot.spawn
+    goal = scenario.goal
     return replace(place, spawn=(spawn.x, spawn.y, spawn.yaw), goal=(goal.x, goal.y))
 
 
@@ -170,9 +172,11 @@ def read_world(screen: Screen[Any], run: Path, show: Callable[[Place, str], None
 
     def read() -> None:
         try:
-            place, notice = place_of_run(run), ""
+            place = place_of_run(run)
+            notice = ""
         except UserError as error:
-            place, notice = Place(), str(error)
+            place = Place()
+            notice = str(error)
         call_if_open(screen, show, place, notice)
 
     screen.call_after_refresh(screen.run_worker, read, thread=True, group="world", exclusive=True)

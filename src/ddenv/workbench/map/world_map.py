@@ -129,7 +129,10 @@ class WorldMap(Widget, can_focus=True):
         self.notice = notice
         self.shown = replace(self.shown, place=place)
         self._numbers = {each.name: number for number, each in enumerate(place.prints)}
-        self._aim, self.picture, self._canvas, self._subtitle_shown = None, None, None, None
+        self._aim = None
+        self.picture = None
+        self._canvas = None
+        self._subtitle_shown = None
         self.fit()
         self.refresh()
 
@@ -182,7 +185,8 @@ class WorldMap(Widget, can_focus=True):
         return Text() if number is None else describe(self.snapshot.state, self.place.prints[number], columns)
 
     def go_to(self, name: str) -> bool:
-        number, port = self._numbers.get(name), self.viewport
+        number = self._numbers.get(name)
+        port = self.viewport
         if number is None or port.view is None:
             return False
         drawn = self.picture
@@ -209,7 +213,9 @@ class WorldMap(Widget, can_focus=True):
             self._unmarked = self._unmarked or copy(self.viewport)
             self.go_to(name)
         elif self._unmarked is not None:
-            self.viewport, self._unmarked, self._aim = self._unmarked, None, None
+            self.viewport = self._unmarked
+            self._unmarked = None
+            self._aim = None
             self.draw()
 
     def select(self, names: Iterable[str]) -> None:
@@ -231,7 +237,9 @@ class WorldMap(Widget, can_focus=True):
 
     def action_pick(self) -> None:
         """While picking, chooses the place under the crosshair; otherwise selects its model."""
-        name, state, port = self.model_at_cursor, self.snapshot.state, self.viewport
+        name = self.model_at_cursor
+        state = self.snapshot.state
+        port = self.viewport
         if self.picking and port.view is not None:
             self.post_message(self.PlacePicked(*(round(value, 3) for value in port.view.point(port.cursor))))
         elif name is None or not state.elements or self.shown.ways:
@@ -284,7 +292,8 @@ class WorldMap(Widget, can_focus=True):
 
     def on_mouse_down(self, event: events.MouseDown) -> None:
         if event.button == 1:
-            self._grabbed, self._dragged = (event.screen_x, event.screen_y), False
+            self._grabbed = (event.screen_x, event.screen_y)
+            self._dragged = False
             self.capture_mouse()
 
     def on_mouse_move(self, event: events.MouseMove) -> None:
@@ -303,7 +312,8 @@ class WorldMap(Widget, can_focus=True):
         self._grabbed = None
         self.release_mouse()
         if not self._dragged and self.viewport.holds((event.y, event.x)):
-            self.viewport.cursor, self._aim = (event.y, event.x), None
+            self.viewport.cursor = (event.y, event.x)
+            self._aim = None
             self.action_pick()
             self._draw_soon()
 
@@ -317,7 +327,8 @@ class WorldMap(Widget, can_focus=True):
         palette = self._mixed() if self.is_attached else None
         # A move of the focus comes here, too, but changes no colour.
         if palette != self._palette:
-            self._palette, self._canvas = palette, None
+            self._palette = palette
+            self._canvas = None
             self.draw()
 
     def _mixed(self) -> Palette:
@@ -421,7 +432,8 @@ class Viewport:
             self.pan(right * max(1, self.view.columns // 8), up * max(1, self.view.rows // 4))
 
     def step(self, right: int, up: int) -> None:
-        row, column = self.cursor[0] - up, self.cursor[1] + right
+        row = self.cursor[0] - up
+        column = self.cursor[1] + right
         if self.holds((row, column)):
             self.cursor = row, column
         else:
@@ -436,4 +448,5 @@ class Viewport:
             self.cursor = self.view.cell(x, y) or self.cursor
 
     def _look(self, view: View) -> None:
-        self.fitted, self.view = False, view
+        self.fitted = False
+        self.view = view

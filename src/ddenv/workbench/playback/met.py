@@ -52,7 +52,9 @@ class Met(Widget):
     def put(self, tests: tuple[Test, ...], lacks: Names) -> None:
         signs = ROBOTS if len(tests) > 1 else ("",)
         lines = ((at, sign, words) for sign, test in zip(signs, tests, strict=False) for at, words in met(test))
-        self._lines, self._lacks, self._now = sorted(lines, key=itemgetter(0)), lacks, 0
+        self._lines = sorted(lines, key=itemgetter(0))
+        self._lacks = lacks
+        self._now = 0
         self.refresh()
 
     def show(self, time: float) -> None:

@@ -49,14 +49,20 @@ SMALLEST = (64, 18)
 PERIOD = 0.1
 # The maximum number of tests in the list of those to play beside one, and the widths of its columns.
 LISTED = 200
-NUMBER, WORDS, SEED, OUTCOME = 7, 32, 12, 16
+NUMBER = 7
+WORDS = 32
+SEED = 12
+OUTCOME = 16
 
 
 class Playing:
     """At simulated `time`, s, of `length`; it runs at `speed` while `on`."""
 
     def __init__(self, length: float, speed: float = USUAL) -> None:
-        self.length, self.time, self.speed, self.on = length, 0.0, speed, False
+        self.length = length
+        self.time = 0.0
+        self.speed = speed
+        self.on = False
 
     def go(self, time: float) -> None:
         self.on = False
@@ -129,7 +135,9 @@ class Playback(Screen[None]):
     ) -> None:
         """Raises UserError if a test is not finished."""
         super().__init__()
-        self._file, self._position, self._place = file, position, place
+        self._file = file
+        self._position = position
+        self._place = place
         self._tests: tuple[Played, ...] = ()
         self._apart: tuple[str, str] | None = None
         self._parting: tuple[float, Point] | None = None
@@ -162,14 +170,16 @@ class Playback(Screen[None]):
             read_world(self, self._file.path, self._placed)
 
     def _placed(self, place: Place, notice: str) -> None:
-        self._place, self._prints = place, MovedPrints(place)
+        self._place = place
+        self._prints = MovedPrints(place)
         self.map.set_place(place, notice)
         self._show()
 
     def _take(self, numbers: Sequence[int]) -> None:
         """Other tests. Raises UserError, with nothing changed."""
         tests = tuple(played(self._file, self._position, number) for number in numbers)
-        self._tests, self._parting = tests, None
+        self._tests = tests
+        self._parting = None
         self._ways = tuple(way_of(one, called(one) if len(tests) == 2 else "its way") for one in tests)
         self._prints = MovedPrints(self._place)
         if len(tests) == 2 and all(one.rows for one in tests):
@@ -188,9 +198,11 @@ class Playback(Screen[None]):
         self._put()
 
     def _put(self) -> None:
-        first, state = self._tests[0], self._position.end
+        first = self._tests[0]
+        state = self._position.end
         there = [one.models if one.models is not None else state.environment for one in self._tests]
-        differ, either = frozenset(there[0]) ^ frozenset(there[-1]), frozenset(there[0]) | frozenset(there[-1])
+        differ = frozenset(there[0]) ^ frozenset(there[-1])
+        either = frozenset(there[0]) | frozenset(there[-1])
         both = tuple(name for name in state.elements if name in either)
         self._apart = ("a", "in only one of them") if differ else None
         groups = (tuple(name for name in both if name in differ),) if differ else ()
@@ -213,13 +225,15 @@ class Playback(Screen[None]):
 
     def _tick(self) -> None:
         at = now()
-        passed, self._ticked = at - self._ticked, at
+        passed = at - self._ticked
+        self._ticked = at
         if self.playing.on:
             self.playing.advance(passed)
             self._show()
 
     def _show(self) -> None:
-        playing, at = self.playing, self.playing.time
+        playing = self.playing
+        at = self.playing.time
         moving = self._tests[0].moving
         prints = self._prints.at({name: pose_at(samples, at) for name, samples in moving.items()})
         parting, place = self._parting or (None, None)
@@ -272,7 +286,8 @@ class Playback(Screen[None]):
             refuse(self, "this is one test; o plays another one over it")
 
     def action_beside(self) -> None:
-        first, state = self._tests[0].test, self._position.end
+        first = self._tests[0].test
+        state = self._position.end
         tests = others(state.tests, first)
 
         def line(number: str, words: str, seed: str, end: str) -> Text:
@@ -287,7 +302,8 @@ class Playback(Screen[None]):
         for test in tests:
             seed = f"{'= ' if test.seed == first.seed else ''}{test.seed}"
             lines.append(line(str(test.id), purpose(state, test), seed, outcome(test)))
-        head, at = line("test", "of", "seed", "end"), min(1, len(tests))
+        head = line("test", "of", "seed", "end")
+        at = min(1, len(tests))
         self.app.push_screen(Pick(f"Play beside test {first.id}", "plays both", lines, head=head, at=at), chosen)
 
     def action_swap(self) -> None:
@@ -297,7 +313,8 @@ class Playback(Screen[None]):
             refuse(self, "this is one test; o plays another one over it")
 
     def action_test(self, by: int) -> None:
-        tests, number = self._position.end.tests, self._tests[0].test.id + by
+        tests = self._position.end.tests
+        number = self._tests[0].test.id + by
         while 0 < number <= len(tests) and not tests[number - 1].is_finished:
             number += by
         if 0 < number <= len(tests):

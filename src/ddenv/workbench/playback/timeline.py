@@ -12,10 +12,15 @@ from ddenv.runs.playback import Played
 from ddenv.words.signs import outcome
 from ddenv.workbench.map.map_words import PARTING
 
-GONE, COMING, NOW, END, TOUCH = "━", "─", "●", "┤", "▾"
+GONE = "━"
+COMING = "─"
+NOW = "●"
+END = "┤"
+TOUCH = "▾"
 ROBOTS = "→⇒"
 # The width of the sign before a line, and the greatest of the words after it.
-SIGN, WORDS = 2, 24
+SIGN = 2
+WORDS = 24
 
 
 class Timeline(Widget):
@@ -27,7 +32,8 @@ class Timeline(Widget):
     def __init__(self, go: Callable[[float], None], turn: Callable[[int], None], *, id: str) -> None:
         """`go` is called with the simulated time, s, that the user wants to see, `turn` with so many frames."""
         super().__init__(id=id)
-        self._go, self._turn = go, turn
+        self._go = go
+        self._turn = turn
         self._time = 0.0
         self._parting: float | None = None
         self._tests: tuple[Played, ...] = ()
@@ -36,7 +42,9 @@ class Timeline(Widget):
     def show(self, time: float, tests: tuple[Played, ...], parting: float | None) -> None:
         """The instant, simulated s, in these tests, and when they part, if so."""
         taller = len(tests) != len(self._tests)
-        self._time, self._tests, self._parting = time, tests, parting
+        self._time = time
+        self._tests = tests
+        self._parting = parting
         self.refresh(layout=taller)
 
     def render(self) -> Text:
@@ -59,7 +67,8 @@ class Timeline(Widget):
         return min(self._room - 1, max(0, round(part * (self._room - 1))))
 
     def _line(self, robot: str, one: Played) -> Text:
-        last, now = self._cell(one.length), self._cell(self._time)
+        last = self._cell(one.length)
+        now = self._cell(self._time)
         cells = [GONE if cell < now else COMING for cell in range(last + 1)] + [" "] * (self._room - 1 - last)
         for _, at in one.test.first_touched:
             if at <= one.length:

@@ -43,7 +43,10 @@ class Asking:
 
     def __init__(self, screen: Screen[Any], poll: Poll, engine: Engine, changed: Callable[[], None]) -> None:
         """`changed` is called when the command that waits for its answer changes."""
-        self._screen, self._poll, self._engine, self._changed = screen, poll, engine, changed
+        self._screen = screen
+        self._poll = poll
+        self._engine = engine
+        self._changed = changed
         # The last command, with its id, 0 while it is being sent.
         self._last: tuple[int, Command | None] = (0, None)
         self._asked_at = 0.0
@@ -61,7 +64,8 @@ class Asking:
 
     @property
     def situation(self) -> Situation:
-        snapshot, last = self._poll.snapshot, self._last[1]
+        snapshot = self._poll.snapshot
+        last = self._last[1]
         pending = last.words(snapshot.state).brief if last is not None and self.waiting_for() else ""
         return Situation(snapshot.state, snapshot.engine, self.barred, pending)
 
@@ -76,7 +80,8 @@ class Asking:
         return "this run file cannot be read" if snapshot.error else ""
 
     def waiting_for(self) -> str:
-        (id, command), snapshot = self._last, self._poll.snapshot
+        (id, command) = self._last
+        snapshot = self._poll.snapshot
         if command is None:
             return ""
         words = command.words(snapshot.state).brief
@@ -152,7 +157,8 @@ class Asking:
         if words := said(command, now):
             self.say(words)
         self.sending += 1
-        self._last, self._asked_at = (0, command), time.monotonic()
+        self._last = (0, command)
+        self._asked_at = time.monotonic()
         self._changed()
 
         def sent(written: asyncio.Future[int]) -> None:

@@ -21,7 +21,8 @@ from ddenv.words.signs import CLAIM, DROPS, VERDICT, brief, dropping, metres, ou
 from ddenv.words.slices import implied_words
 
 # Maximum widths of a model's name as a verdict and as a row, in cells.
-NAME, MODEL_WIDTH = 8, 18
+NAME = 8
+MODEL_WIDTH = 18
 # The latest judged tries that stay in the table.
 TRIALS = 3
 
@@ -229,7 +230,8 @@ def _claim(snapshot: Snapshot, one: FreshRuns) -> str:
     """The verdict of a claim, and how the robot fails without a needed model."""
     if one.claim is None:
         return _running(snapshot, one.running)
-    words, certificate = f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}", snapshot.state.certificate
+    words = f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}"
+    certificate = snapshot.state.certificate
     end = None if certificate is None else failing_instead(snapshot.state, certificate, one.claim)
     if end is None:
         return words

@@ -19,7 +19,8 @@ from ddenv.runfile.state import Candidate, Test, Trial
 from ddenv.workbench.run.candidate_rows import Column, Item, Listed, Words, fitting, listed, words
 from ddenv.workbench.shared.bindings import keys
 
-STRONG, WEAK = Style(bold=True), Style(dim=True)
+STRONG = Style(bold=True)
+WEAK = Style(dim=True)
 # More rows than there are.
 FAR = 1_000_000_000
 
@@ -72,9 +73,12 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         return words(self._snapshot, self._listed, row)
 
     def show(self, snapshot: Snapshot) -> None:
-        before, self._listed, self._snapshot = self._listed, listed(snapshot), snapshot
+        before = self._listed
+        self._listed = listed(snapshot)
+        self._snapshot = snapshot
         if self._listed.of != before.of:
-            self.following, self.cursor_row = True, 0
+            self.following = True
+            self.cursor_row = 0
             self.scroll_to(y=0, animate=False, force=True)
         elif shift := len(self._listed.trials) - len(before.trials):
             # The row that the user looks at stays where it is.

@@ -19,7 +19,8 @@ from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.bindings import keys
 
 # Maximum number of names listed at once, and the maximum width of each in cells; typing finds others.
-LISTED, WIDTH = 100, 36
+LISTED = 100
+WIDTH = 36
 
 
 class ChooseModels(ModalScreen[Names | None]):
@@ -49,7 +50,9 @@ class ChooseModels(ModalScreen[Names | None]):
         `mark` shows a model on the map, and none in the end.
         """
         super().__init__()
-        self._title, self._several, self._mark = title, several, mark
+        self._title = title
+        self._several = several
+        self._mark = mark
         self._pinned = frozenset(pinned)
         self._chosen = set(chosen)
         self._names = tuple(sorted(names, key=lambda name: name not in self._chosen))

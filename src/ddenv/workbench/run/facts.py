@@ -35,11 +35,15 @@ def facts(position: Position, number: int, command: str) -> tuple[str, Text] | N
     start = position.start_of(number)
     if start is None:
         return None
-    state, test = position.end, position.end.test(number)
-    models, place, took = state.models_of(test), "", ""
+    state = position.end
+    test = position.end.test(number)
+    models = state.models_of(test)
+    place = ""
+    took = ""
     again = f" · re-run {test.run}" if test.phase == "round" and test.run else ""
     if test.end_pose is not None:
-        (x, y, z), away = test.end_pose[:3], metres(test.distance, 2)
+        x, y, z = test.end_pose[:3]
+        away = metres(test.distance, 2)
         place = f"({x:.2f}, {y:.2f}, {z:.2f}) m{f', {away} from the end of f' if away else ''}"
     if test.implied_by is not None:
         took = f"not simulated: no model that it lacks can have affected test {test.implied_by}, which implies it"
@@ -103,7 +107,10 @@ class FactsDialog(ModalScreen[None]):
     def __init__(self, position: Position, test: int, run: str, play: Callable[[int], str]) -> None:
         """`run` is what a shell calls the run. `play` plays a test back, or returns why it cannot."""
         super().__init__()
-        self._position, self._test, self._run, self._play = position, test, run, play
+        self._position = position
+        self._test = test
+        self._run = run
+        self._play = play
 
     def compose(self) -> ComposeResult:
         hints = "← → other tests   p plays it   c copies the command   escape closes"
@@ -120,7 +127,8 @@ class FactsDialog(ModalScreen[None]):
             self.query_one(Framed).say(plain(str(error)))
             return
         if found is not None:
-            self._test, (title, words) = test, found
+            self._test = test
+            (title, words) = found
             self.query_one(".dialog").border_title = Text(title)
             self.query_one("#facts", Static).update(words)
             self.query_one(VerticalScroll).scroll_home(animate=False)

@@ -30,7 +30,8 @@ class Happening(Widget):
 
     def show(self, snapshot: Snapshot, trouble: str = "") -> None:
         """`trouble` comes first: what went wrong with the engine itself."""
-        state, moment = snapshot.state, time.monotonic()
+        state = snapshot.state
+        moment = time.monotonic()
         round = None if state.round is None else (state.round.number, state.round.done)
         decided = state.paused, state.waiting_candidate, state.confirming, state.node, round
         urgent = trouble, snapshot.happened, snapshot.status, snapshot.error, *decided
@@ -40,19 +41,24 @@ class Happening(Widget):
         # With this most of `words` is loaded: the screen is shown before.
         from ddenv.words.explain import explain
 
-        before, self._explanation = (self._urgent[:1], self._explanation), explain(snapshot)
-        self._urgent, self._shown_at = urgent, moment
+        before = (self._urgent[:1], self._explanation)
+        self._explanation = explain(snapshot)
+        self._urgent = urgent
+        self._shown_at = moment
         if before != ((trouble,), self._explanation):
             self.refresh()
 
     def render(self) -> Text:
         if self._explanation is None:
             return Text()
-        (width, height), lines, current = self.size, self._explanation.lines, self._explanation.line
+        (width, height) = self.size
+        lines = self._explanation.lines
+        current = self._explanation.line
         sentences = [Text(sentence) for sentence in self._explanation.sentences]
         if trouble := self._urgent[0]:
             sentences.insert(0, Text(str(trouble), self.app.theme_variables["text-error"]))
-        text, said = Text(), Text("\n").join(sentences)
+        text = Text()
+        said = Text("\n").join(sentences)
         if current is None:
             return said
         room = height - len(said.wrap(self.app.console, max(1, width)))

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 # Columns behind the name: part, distance, first sensed.
 REST = 3 + 9 + 9
 LEVELS = " ▁▂▃▄▅▆▇█"
-NEEDED, DECIDED = "╌", "▲"
+NEEDED = "╌"
+DECIDED = "▲"
 DIM = Style(dim=True)
 
 
@@ -40,7 +41,8 @@ class ModelsLeft(Vertical):
     def __init__(self, find: Callable[[str], None], *, id: str) -> None:
         """`find` is called with the name of a model that was clicked."""
         super().__init__(id=id, classes="panel")
-        self.border_title, self._find = "Models left", find
+        self.border_title = "Models left"
+        self._find = find
         self._made_of: tuple[object, ...] = ()
         # The part of each model, its footprint, and when it was sensed, simulated s; where f ended, m.
         self._parts: dict[str, str] = {}
@@ -77,7 +79,8 @@ class ModelsLeft(Vertical):
         return math.hypot(*(max(low - at, at - high, 0.0) for low, at, high in sides))
 
     def _line(self, name: str, width: int) -> Text:
-        room, stands = max(4, width - REST), self._prints.get(name)
+        room = max(4, width - REST)
+        stands = self._prints.get(name)
         away = "" if stands is None or self._f is None else f"{stands.distance(self._f):.1f} m"
         sensed = f"{self._sensed[name]:.1f} s" if name in self._sensed else "never"
         text = Text(padded(shortened(name, room), room), no_wrap=True)
@@ -132,14 +135,16 @@ def steps(course: Course, width: int, height: int, styles: tuple[Style, Style, S
     ruled = height >= 6 or (height >= 4 and bool(course.decided))
     rows = height - 1 - ruled
     # For each column, how many models were left, and in which row the line of needed ones is: below the chart without any.
-    left, levels = [], []
+    left = []
+    levels = []
     for column in range(columns):
         at = last * column / max(1, columns - 1)
         place = max(0, bisect_right(points, at, key=lambda point: point.tests) - 1)
         needed = max(points[place].needed, course.needed if place == len(points) - 1 else 0)
         left.append(points[place].models)
         levels.append(min(rows - 1, rows - 1 - int((needed / most) * rows - 1e-9)) if needed else rows)
-    marks, middle = {0: str(most), rows - 1: "0"}, rows // 2
+    marks = {0: str(most), rows - 1: "0"}
+    middle = rows // 2
     if rows >= 5 and (words := str(round(most * (1 - middle / rows)))) not in marks.values():
         marks[middle] = words
     if course.needed and levels[-1] < rows:
@@ -150,7 +155,8 @@ def steps(course: Course, width: int, height: int, styles: tuple[Style, Style, S
         cells = []
         for models, level in zip(left, levels, strict=True):
             eighths = max(1 if models else 0, round(models / most * rows * 8)) - 8 * (rows - 1 - row)
-            char, full = LEVELS[min(8, max(0, eighths))], eighths > 8
+            char = LEVELS[min(8, max(0, eighths))]
+            full = eighths > 8
             # Where steps and line meet in one row, the steps are drawn.
             cells.append((NEEDED, 2) if level == row and full else (char, int(full)))
         for kind, chars in groupby(cells, itemgetter(1)):
@@ -162,7 +168,8 @@ def steps(course: Course, width: int, height: int, styles: tuple[Style, Style, S
         for column in range(columns):
             rule.append(*((DECIDED, styles[2]) if column in decided else ("─", DIM)))
         text.append_text(rule).append("\n")
-    end, words = count(course.tests, "test"), f"{count(points[-1].models, 'model')} left"
+    end = count(course.tests, "test")
+    words = f"{count(points[-1].models, 'model')} left"
     space = columns - 1 - len(end)
     least = f"{words}, at least {course.needed} needed" if course.needed else words
     fitting = next((each for each in (least, words) if len(each) + 2 <= space), "")

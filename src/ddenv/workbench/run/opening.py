@@ -39,7 +39,9 @@ class Opening:
 
     def __init__(self, screen: RunScreen) -> None:
         self._screen = screen
-        self._poll, self._asking, self._scene = screen.poll, screen.asking, screen.scene
+        self._poll = screen.poll
+        self._asking = screen.asking
+        self._scene = screen.scene
 
     def _open(self, dialog: Screen[Answer | None], then: Callable[[Answer], object]) -> None:
         """Calls `then` with the answer, unless the dialog is cancelled."""
@@ -64,7 +66,8 @@ class Opening:
         if not self._screen.world.is_on_screen:
             # The map shows the model under the cursor.
             self._screen.action_pane("map")
-        pinned, mark = self._poll.snapshot.state.pinned, self._screen.world.mark
+        pinned = self._poll.snapshot.state.pinned
+        mark = self._screen.world.mark
         self._open(ChooseModels(title, names, several=several, mark=mark, pinned=pinned, chosen=chosen), then)
 
     def find(self) -> None:
@@ -114,7 +117,8 @@ class Opening:
     def play_test(self, test: int, beside: int | None = None) -> str:
         from ddenv.workbench.playback.playback_screen import Playback
 
-        position, place = self._screen.browsing.position, self._screen.world.place
+        position = self._screen.browsing.position
+        place = self._screen.world.place
         try:
             self._screen.app.push_screen(Playback(self._poll.file, position, place, test, beside))
         except UserError as error:
@@ -128,14 +132,16 @@ class Opening:
             works = self._poll.snapshot.engine != "absent"
             return works, "" if works else self._screen.engine.trouble
 
-        position, place = self._screen.browsing.position, self._screen.world.place
+        position = self._screen.browsing.position
+        place = self._screen.world.place
         self._screen.app.push_screen(WhyScreen(self._poll.file, position, place, engine, self._asking.ask))
 
     def layers(self) -> None:
         self._screen.app.push_screen(Layers(self._screen.world), lambda _: self._screen.show_legend())
 
     def copy(self) -> None:
-        path, name = self._poll.path, attach_name(self._poll.path)
+        path = self._poll.path
+        name = attach_name(self._poll.path)
         texts = [("names of the models left", "\n".join(self._poll.snapshot.state.environment))]
         if selected := self._screen.pointed.models:
             texts.append(("names selected", "\n".join(selected)))
@@ -161,7 +167,8 @@ class Opening:
 
     def inside(self) -> None:
         """Begins a run inside the models that are left, and shows it."""
-        state, works = self._poll.snapshot.state, self._poll.snapshot.engine != "absent"
+        state = self._poll.snapshot.state
+        works = self._poll.snapshot.engine != "absent"
         if why := self._asking.barred:
             self._asking.refuse(why)
             return
@@ -169,7 +176,8 @@ class Opening:
             what = "the reduction" if state.margining is None else "the search for margins"
             then = "" if works else "; r goes on with it"
             if state.isolating is not None:
-                what, then = "the search for a world that passes", "; i stops it" if works else then
+                what = "the search for a world that passes"
+                then = "; i stops it" if works else then
             self._asking.refuse(f"I works once {what} is over{then}")
             return
 

@@ -51,11 +51,14 @@ WATCHING = "watching only: no key changes anything"
 # The panes and their words, in the order of the keys 1 to 5.
 PANES = {"map": "map", "round": "round", "chart": "chart", "now": "what is happening", "log": "log"}
 # How often the run file is read, s. While it catches up with a long run: the time to the next look, and between two updates.
-PERIOD, AT_ONCE, CATCHING_UP = 0.1, 0.002, 0.5
+PERIOD = 0.1
+AT_ONCE = 0.002
+CATCHING_UP = 0.5
 # The map stays with a candidate for at least this time, s.
 CALM = 4.0
 # Where map, table and chart stand side by side, and where models and decisions do too.
-WIDE, HUGE = 110, 170
+WIDE = 110
+HUGE = 170
 
 
 class RunScreen(Screen[None]):
@@ -76,16 +79,21 @@ class RunScreen(Screen[None]):
         """
         super().__init__(classes=f"-pane-map {classes}")
         self.run = run
-        self.engine, self.scene, self._log = engine or Engine(run), Scene(run), Log()
+        self.engine = engine or Engine(run)
+        self.scene = Scene(run)
+        self._log = Log()
         self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, on_event=self._note)
         self.browsing = Browsing(self.poll)
-        self.table, self.world = Candidates(self._row_chosen, id="candidates"), WorldMap(id="map")
+        self.table = Candidates(self._row_chosen, id="candidates")
+        self.world = WorldMap(id="map")
         self._legend = MapLines(id="map-lines")
         self._footer = KeyFooter(LOOKING if watch else FIRST, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self._pane = "map"
         # Whether something is not shown yet, whether the next look comes soon, and when the run was shown last.
-        self._stale, self._coming, self._shown_at = False, False, time.monotonic()
+        self._stale = False
+        self._coming = False
+        self._shown_at = time.monotonic()
         # The round and the candidate that the map stays with, and until when.
         self._stays: tuple[tuple[int, int] | None, int, float] = (None, 0, 0.0)
 
@@ -154,7 +162,9 @@ class RunScreen(Screen[None]):
 
     def look(self) -> None:
         """Shows what is new; while it catches up with a long run, whose events are old, only now and then."""
-        poll, before, live = self.poll, self.poll.snapshot, not self.poll.catching_up
+        poll = self.poll
+        before = self.poll.snapshot
+        live = not self.poll.catching_up
         if poll.look() is not None:
             self._stale = True
             if poll.snapshot.engine == "alive":
@@ -167,7 +177,8 @@ class RunScreen(Screen[None]):
             self._coming = True
             self.set_timer(AT_ONCE, self._look_on)
         if not poll.catching_up or time.monotonic() - self._shown_at >= CATCHING_UP:
-            changed, self._stale = self._stale, False
+            changed = self._stale
+            self._stale = False
             if changed:
                 self._shown_at = time.monotonic()
             self._show(changed)
@@ -178,8 +189,10 @@ class RunScreen(Screen[None]):
 
     def _focus(self) -> Candidate | None:
         """The candidate to show. However fast the current one changes, it stays for `CALM` seconds, so that it can be read."""
-        snapshot, moment = self.snapshot, time.monotonic()
-        state, focus = snapshot.state, snapshot.focus
+        snapshot = self.snapshot
+        moment = time.monotonic()
+        state = snapshot.state
+        focus = snapshot.focus
         if snapshot.past:
             return focus
         round, index, until = self._stays
@@ -212,7 +225,8 @@ class RunScreen(Screen[None]):
             # Its rows are wider than those of candidates. As a class of the screen it would compute all styles again.
             each.set_class(snapshot.state.certificate is not None, "-certificate")
         panel.border_title, panel.border_subtitle = round_title(snapshot.state)
-        log, entries = self.query_one("#log", Lines), self._log.until(self.browsing.position.at)
+        log = self.query_one("#log", Lines)
+        entries = self._log.until(self.browsing.position.at)
         if len(entries) != len(log.items):
             log.show(entries)
         decisions = self.query_one("#decisions", Lines)
@@ -227,11 +241,14 @@ class RunScreen(Screen[None]):
         self._show_keys()
 
     def _show_map(self) -> None:
-        snapshot, focus = self.snapshot, self._focus()
+        snapshot = self.snapshot
+        focus = self._focus()
         self.world.show(snapshot, self.table.chosen or focus)
         self.show_legend()
-        at, round = self.browsing.position.at, snapshot.state.round
-        row, wanted = self.table.chosen or (focus if snapshot.past else None), Wanted(at)
+        at = self.browsing.position.at
+        round = snapshot.state.round
+        row = self.table.chosen or (focus if snapshot.past else None)
+        wanted = Wanted(at)
         if isinstance(row, Trial):
             wanted = Wanted(at, trial=row.number)
         elif row is not None and round is not None:
@@ -297,7 +314,8 @@ class RunScreen(Screen[None]):
     def _show_keys(self) -> None:
         if self.poll.watch or not self._footer.is_attached:
             return
-        now, pointed = self.asking.situation, self.pointed
+        now = self.asking.situation
+        pointed = self.pointed
         for name, binding in GUIDING.items():
             offered = offer(name, now, pointed)
             self._footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)

@@ -23,7 +23,8 @@ class Browsing:
     """Where in the run the screen is: at its end, where it follows the run, or at an earlier moment."""
 
     def __init__(self, poll: Poll) -> None:
-        self._poll, self._moments = poll, Moments(poll.file)
+        self._poll = poll
+        self._moments = Moments(poll.file)
         self.position = Position(poll.file.events)
         self._shown: tuple[int | None, Snapshot] = (None, Snapshot())
 

@@ -49,7 +49,8 @@ class Header(Widget):
             self.refresh()
 
     def render(self) -> Text:
-        (lefts, rights), room = self._heading, self.size.width - 9
+        (lefts, rights) = self._heading
+        room = self.size.width - 9
         shortest = min(map(len, lefts))
         right = next((each for each in rights if shortest + len(each) + 2 <= room), rights[-1])
         room = max(0, room - len(right) - 2)
@@ -75,7 +76,8 @@ class Status(Widget):
         if (scene, asked, place) == self._besides and snapshot is self._snapshot:
             # Counting the tests of a long run takes longer than answering a key.
             return
-        self._snapshot, self._besides = snapshot, (scene, asked, place)
+        self._snapshot = snapshot
+        self._besides = (scene, asked, place)
         now = facts(snapshot, scene, asked) if place is None else facts_of_past(snapshot, scene, *place)
         if now != self._facts:
             self._facts = now
@@ -104,7 +106,8 @@ class Status(Widget):
 def heading(state: RunState) -> tuple[Sentences, Sentences]:
     options = settings(state)
     lefts = tuple(f"{options.name} · {label}" for label in labels(options.algorithm, options.pair))
-    total, kept = len(state.elements), len(state.environment)
+    total = len(state.elements)
+    kept = len(state.environment)
     size = f"{kept} of {count(total, 'model')}"
     more = [f"{percent(1 - kept / total)} smaller"] if kept < total else []
     pinned = [f"{len(state.pinned)} pinned"] if state.pinned else []
@@ -137,13 +140,16 @@ def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:
     status = "isolating" if snapshot.status == "running" and state.isolating is not None else status
     status = "margins" if status == "running" and state.margining is not None else status
     status = "settling" if status == "baseline" and state.settling else status
-    (sign, word), way_on = STATUS.get(status, ("·", status)), ""
+    (sign, word) = STATUS.get(status, ("·", status))
+    way_on = ""
     if snapshot.gone:
-        sign, word = "✗", "the run file is gone"
+        sign = "✗"
+        word = "the run file is gone"
     elif status == "lost":
         way_on = ": r resumes"
     elif state.needs_room and not state.ended:
-        sign, word = "!", "file too large" if state.file_is_full else "out of disk space"
+        sign = "!"
+        word = "file too large" if state.file_is_full else "out of disk space"
     return {
         "state": (f"{sign} {word}{way_on}", f"{sign} {word}"),
         "asked": (f"… {asked}", "…") if asked else (),
@@ -221,7 +227,8 @@ def title(snapshot: Snapshot) -> str:
     sign, word = STATUS.get(snapshot.status, ("·", snapshot.status))
     models = f"{len(state.environment)} of {count(len(state.elements), 'model')}"
     said = "" if snapshot.status in ("running", "baseline") else f", {word}"
-    left, done = remaining(state, snapshot.engine == "alive"), state.tests_done
+    left = remaining(state, snapshot.engine == "alive")
+    done = state.tests_done
     part = "" if left is None else f"{STEP * int(100 * done / max(1, done + left.tests[1]) / STEP)} % "
     return f"{sign} {part}{name}: {models}{said}"
 

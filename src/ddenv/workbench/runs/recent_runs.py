@@ -53,7 +53,8 @@ class RunsFolder:
     def _look(self, path: Path, stamp: tuple[int, ...], until: float) -> Recent:
         read = self._read.get(path)
         if (read is None or read.stamp != stamp) and time.monotonic() < until:
-            last, read = read, _read(path, stamp, read.state if read else None)
+            last = read
+            read = _read(path, stamp, read.state if read else None)
             # A file that another program has locked is read again at the next call.
             read = last if last is not None and not read.stamp else read
             self._read[path] = read
@@ -69,7 +70,8 @@ class RunsFolder:
 
 def _stamp(path: Path) -> tuple[int, ...]:
     """When a run file and its log were changed, in ns, and how large they are: it is read again if one of these differs."""
-    file, log = path.stat(), path.with_name(f"{path.name}-wal")
+    file = path.stat()
+    log = path.with_name(f"{path.name}-wal")
     with suppress(OSError):
         logged = log.stat()
         return (max(file.st_mtime_ns, logged.st_mtime_ns), file.st_size, logged.st_mtime_ns, logged.st_size)

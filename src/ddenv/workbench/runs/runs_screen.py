@@ -39,7 +39,8 @@ BESIDE = (*LOGS, ".log", ".scene.log", ".place")
 # How long a deleted run is kept, s.
 KEPT = 7 * 86_400.0
 # The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
-PERIOD, PATIENCE = 1.0, 0.3
+PERIOD = 1.0
+PATIENCE = 0.3
 # The footer's keys by priority.
 FIRST = ids("runs", "help back open sort filter delete undo mark compare path watch like")
 
@@ -147,7 +148,8 @@ class RunsScreen(Screen[None]):
         runs = self._folder.look(PATIENCE)
 
         def show() -> None:
-            self._reading, self._runs = False, runs
+            self._reading = False
+            self._runs = runs
             self._list()
             # The rest is read at once.
             if any(not run.status and not run.trouble for run in runs):

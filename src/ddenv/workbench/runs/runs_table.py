@@ -100,7 +100,8 @@ def moment(time: float) -> str:
     if not time:
         return ""
     try:
-        then, today = datetime.fromtimestamp(time), datetime.fromtimestamp(poll.now()).date()
+        then = datetime.fromtimestamp(time)
+        today = datetime.fromtimestamp(poll.now()).date()
     except (ValueError, OverflowError, OSError):
         # File systems allow years beyond the calendar.
         return "?"
@@ -120,7 +121,8 @@ class RunTable(DataTable[Text]):
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, cursor_type="row", zebra_stripes=False)
         self._runs: list[Recent] = []
-        self._wide, self._order = 0, ""
+        self._wide = 0
+        self._order = ""
         self._shown: list[_Column] = []
 
     @property
@@ -135,7 +137,9 @@ class RunTable(DataTable[Text]):
 
     def show(self, runs: list[Recent], order: str) -> None:
         """Shows these in this order, whose column is marked; the cursor stays on its run."""
-        before, paths, followed = self._runs, [run.path for run in runs], self._followed
+        before = self._runs
+        paths = [run.path for run in runs]
+        followed = self._followed
         self._runs = list(runs)
         if (self._wide, self._order) == (self.size.width, order) and paths == [run.path for run in before]:
             for was, run in zip(before, runs, strict=True):
@@ -143,7 +147,8 @@ class RunTable(DataTable[Text]):
                     for column, cell in zip(self.ordered_columns, self._row(run), strict=True):
                         self.update_cell(str(run.path), column.key, cell)
             return
-        self._wide, self._order = self.size.width, order
+        self._wide = self.size.width
+        self._order = order
         self.clear(columns=True)
         room = self._wide - sum(width + AROUND for _, width, *_ in FIRST) - AROUND - 1
         self._shown = list(FIRST)

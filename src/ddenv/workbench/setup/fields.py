@@ -161,11 +161,14 @@ class OptionsForm(Vertical):
             return
         kind = next((kind for kind in KINDS if kind == id), KINDS[0])
         name = chosen(algorithm, pair)[kind]
-        title, words, warning = f"{kind} {plain(name)}", paragraph(kind, name), note(kind, algorithm)
+        title = f"{kind} {plain(name)}"
+        words = paragraph(kind, name)
+        warning = note(kind, algorithm)
         if id in FIELDS:
             one = FIELDS[id]
             words = " ".join(filter(None, (as_sentence(one.summary), one.more, one.cost)))
-            title, warning = one.label, not_used(one, algorithm)
+            title = one.label
+            warning = not_used(one, algorithm)
         text = Text(title, "bold").append("  ")
         if warning:
             text.append(warning, f"bold {self.app.theme_variables['text-warning']}").append(" ")
@@ -195,7 +198,8 @@ class OptionsForm(Vertical):
             return
         if any(FIELDS[id] in form.ADVANCED for id in error.wrong):
             self._show_more(True)
-        self._message, self._problems = "", error.wrong | self._problems | error.wrong
+        self._message = ""
+        self._problems = error.wrong | self._problems | error.wrong
 
         def point() -> None:
             self._show_problems()
@@ -267,7 +271,8 @@ def _widgets(fields: tuple[Setting, ...], texts: Mapping[str, str] = {}) -> Iter
     for one in fields:
         yield Label(one.label, markup=False)
         if names := form.choices(one):
-            value, choices = texts.get(one.name, names[0]), [(name, name) for name in names]
+            value = texts.get(one.name, names[0])
+            choices = [(name, name) for name in names]
             yield Select(choices, value=value, id=one.name, allow_blank=False, compact=True)
         else:
             yield Entry(texts.get(one.name, ""), id=one.name, placeholder=one.none)

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
 # The maximum number of recent files: in a longer list files are hard to find.
-RECENT, KEPT = "recent.json", 12
+RECENT = "recent.json"
+KEPT = 12
 SCENARIO = (".yaml", ".yml")
 SUFFIXES = (*SCENARIO, *SDF_ENDINGS)
 
@@ -69,7 +70,8 @@ class FileList(OptionList):
         self._looked: str | None = None
 
     def offer(self, bundled: list[Path], recent: list[Path], like: Path | None = None) -> None:
-        self._bundled, self._like = bundled, like
+        self._bundled = bundled
+        self._like = like
         self._recent = [path for path in recent if path not in bundled]
         self._fill()
         if self.option_count:

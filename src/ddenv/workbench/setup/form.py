@@ -12,7 +12,8 @@ from ddenv.text import Names
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
-ON, OFF = "on", "off"
+ON = "on"
+OFF = "off"
 # Longer numbers are shown rounded, in characters.
 LONGEST_NUMBER = 10
 
@@ -106,14 +107,16 @@ def text_of(value: Value) -> str:
 
 
 def places_of(scenario: Scenario) -> dict[str, float]:
-    spawn, goal = scenario.robot.spawn, scenario.goal
+    spawn = scenario.robot.spawn
+    goal = scenario.goal
     numbers = (spawn.x, spawn.y, spawn.z, spawn.yaw, goal.x, goal.y)
     return {one.name: number for one, number in zip(PLACES, numbers, strict=True)}
 
 
 def texts_of(scenario: Scenario) -> dict[str, str]:
     """Long numbers are rounded: two thirds are 0.667, which `asked_of` takes for unchanged."""
-    data, texts = scenario.model_dump(mode="json"), {}
+    data = scenario.model_dump(mode="json")
+    texts = {}
     for one in FIELDS.values():
         if one.key:
             value = read(data, one)
@@ -127,7 +130,8 @@ def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str
     from ddenv.runs.subject import with_values
     from ddenv.world.load import validate
 
-    data, before = base.model_dump(mode="json"), texts_of(base)
+    data = base.model_dump(mode="json")
+    before = texts_of(base)
     given = values(tuple(FIELDS[name] for name in before), texts)
     # What is unchanged is not asked for: one field may set what others show, and a long number is shown rounded.
     known = {name: one for name, one in SETTINGS.items() if name in given and texts.get(name) != before[name]}

@@ -35,8 +35,11 @@ if TYPE_CHECKING:
     from ddenv.world.model import Note, World
     from ddenv.world.scenario import Reading
 
-OPEN, DONE = "?", "✓"
-MISSING, UNREADABLE, UNSUPPORTED = "missing file", "unreadable file", "unsupported element"
+OPEN = "?"
+DONE = "✓"
+MISSING = "missing file"
+UNREADABLE = "unreadable file"
+UNSUPPORTED = "unsupported element"
 HOW = """auto       a guessed shape
 none       without it
 /a/folder  the folder that holds its model's folder; tab completes
@@ -75,7 +78,9 @@ def read_with_remedies(
     from ddenv.world.sdf.read import read_world
     from ddenv.world.sdf.standin import AUTO
 
-    known, found, vain = remembered(), dict[str, str](), dict[str, str]()
+    known = remembered()
+    found = dict[str, str]()
+    vain = dict[str, str]()
     wrong = dict[str, str]()
     while True:
         chosen = with_remedies(options, found)
@@ -137,7 +142,8 @@ class MissingList(OptionList):
     def show(self, rows: tuple[Missing, ...], notes: tuple[Note, ...] = ()) -> None:
         """Shows other rows; the cursor stays where it was, or goes to the first row without a remedy."""
         same = [row.uri for row in rows] == [row.uri for row in self._rows]
-        place, self._rows = self.highlighted if same else None, rows
+        place = self.highlighted if same else None
+        self._rows = rows
         of_files = tuple(note for note in notes if not any(f"'{row.uri}'" in note.why for row in rows))
         self.set_options([Option(self._line(row), id=row.uri) for row in rows])
         for (what, kind, why), number in Counter((note.what, note.kind, note.why) for note in of_files).items():

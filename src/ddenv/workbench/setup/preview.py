@@ -79,7 +79,8 @@ class Preview(Vertical):
     def __init__(self, form: OptionsForm, reading: Mapping[str, Any], *, id: str) -> None:
         """`reading` holds the command line's options for reading worlds."""
         super().__init__(id=id, classes="panel")
-        self._form, self._reading = form, reading
+        self._form = form
+        self._reading = reading
         self.map = WorldMap(id="map")
         self.missing = MissingList(id="missing")
         self.choice: Choice | None = None
@@ -115,7 +116,8 @@ class Preview(Vertical):
     def read(self, path: Path, *, opened: bool) -> None:
         """Reads a scenario, a world or a run in a thread. A file that the user `opened` is remembered."""
         self._keeps_places = self.choice is not None and self.choice.bare
-        self.awaited, self.past = True, Past()
+        self.awaited = True
+        self.past = Past()
         self.show_nothing("reading the world ...")
         self._title(path.name)
         self._read(path, opened)
@@ -130,7 +132,8 @@ class Preview(Vertical):
         self.map.set_place(Place(), why)
 
     def _title(self, name: str) -> None:
-        self.border_title, self.border_subtitle = Text(shortened(plain(name), 40)), ""
+        self.border_title = Text(shortened(plain(name), 40))
+        self.border_subtitle = ""
 
     @work(thread=True, group="world", exclusive=True)
     def _read(self, path: Path, opened: bool, again: bool = False) -> None:
@@ -163,7 +166,8 @@ class Preview(Vertical):
 
     def _show(self, choice: Choice, place: Place, name: str, opened: bool, again: bool) -> None:
         """Shows what was read; `again` if only its remedies changed."""
-        self.choice, self.awaited = choice, False
+        self.choice = choice
+        self.awaited = False
         self._title(choice.name)
         self.map.set_place(place)
         self.missing.show(choice.missing, choice.world.notes)
@@ -259,7 +263,8 @@ class Preview(Vertical):
             z = choice.spawn_height(*at)
             self._ground_z = "" if z is None else _metres(z)
             self._form.set_texts({"spawn_z": self._ground_z, "yaw": texts["yaw"] or "0"})
-        spawn, goal = self.spawn, self.goal
+        spawn = self.spawn
+        goal = self.goal
         self.map.set_marks((spawn[0], spawn[1], spawn[3]) if spawn else None, (goal[0], goal[1]) if goal else None)
         self._show_picking()
         self._look_at_start(choice, spawn, goal)
@@ -279,11 +284,15 @@ class Preview(Vertical):
 
     @on(WorldMap.PlacePicked)
     def _place_picked(self, event: WorldMap.PlacePicked) -> None:
-        x, y, spawn, then = event.x, event.y, self.spawn, ""
+        x = event.x
+        y = event.y
+        spawn = self.spawn
+        then = ""
         if self.choice is None or not self.picked_next:
             return
         if self.picked_next == "start":
-            yaw, z = self._form.texts["yaw"].strip() or "0", self.choice.spawn_height(x, y)
+            yaw = self._form.texts["yaw"].strip() or "0"
+            z = self.choice.spawn_height(x, y)
             texts = {"spawn_x": _metres(x), "spawn_y": _metres(y), "yaw": yaw}
             texts |= {} if z is None else {"spawn_z": _metres(z)}
             then = "heading"
@@ -300,13 +309,15 @@ class Preview(Vertical):
     def _show_picking(self) -> None:
         from ddenv.map.raster import arrow
 
-        line, what = self.query_one("#picking", Static), self.picked_next
+        line = self.query_one("#picking", Static)
+        what = self.picked_next
         line.set_class(bool(what), "-on")
         text = Text(no_wrap=True, overflow="ellipsis")
         if what:
             line.update(text.append("▶ ", "bold").append(ASKS[what]).append("   escape stops", "dim"))
             return
-        spawn, goal = self.spawn, self.goal
+        spawn = self.spawn
+        goal = self.goal
         if self.choice is None:
             line.update("")
         elif spawn is None and goal is None and self.choice.bare:
@@ -323,7 +334,9 @@ class Preview(Vertical):
         from ddenv.world.placement import note_inside, notes_on_start, stands_inside
         from ddenv.world.scenario import Spawn
 
-        worker, free, found = get_current_worker(), None, tuple(note_inside(choice.world))
+        worker = get_current_worker()
+        free = None
+        found = tuple(note_inside(choice.world))
         # Start then reports the error of a robot's file.
         with suppress(UserError):
             if spawn is not None and (robot := choice.robot):
@@ -332,7 +345,8 @@ class Preview(Vertical):
                 found = tuple(notes_on_start(choice.world, robot, start, end))
                 if (inside := stands_inside(choice.world, robot, start, end)) is not None:
                     why, place = inside
-                    found, free = (("start", why), *found), None if place is None else (place.x, place.y)
+                    found = (("start", why), *found)
+                    free = None if place is None else (place.x, place.y)
         if not worker.is_cancelled:
             call_if_open(self, self._show_notes, found, free)
 
@@ -349,7 +363,8 @@ class Preview(Vertical):
             line.tooltip = Text("\n".join(f"{plain(words)}." for _, words in found))
 
     def _show_about(self) -> None:
-        line, words = self.query_one("#about", Static), "" if self.choice is None else self.choice.about
+        line = self.query_one("#about", Static)
+        words = "" if self.choice is None else self.choice.about
         most = line.styles.max_height
         lines = wrap(words, max(3, line.content_size.width), max_lines=most and most.cells, placeholder=" …")
         line.update(Text("\n".join(lines) if lines and lines[-1].endswith(" …") else words))

@@ -104,7 +104,8 @@ class SetupScreen(Screen[None]):
         """
         super().__init__(classes=classes)
         self._reading = reading or {}
-        self._like, self._file = like, file
+        self._like = like
+        self._file = file
         self.form = OptionsForm(id="options")
         self.preview = Preview(self.form, self._reading, id="preview")
         self._opened_now: Path | None = None
@@ -145,7 +146,8 @@ class SetupScreen(Screen[None]):
     def _list_files(self) -> None:
         from ddenv.world.load import SCENARIOS, bundled_names
 
-        bundled, recent = [SCENARIOS / f"{name}.yaml" for name in bundled_names()], recent_files()
+        bundled = [SCENARIOS / f"{name}.yaml" for name in bundled_names()]
+        recent = recent_files()
 
         def offer() -> None:
             files = self.query_one(FileList)
@@ -210,12 +212,15 @@ class SetupScreen(Screen[None]):
 
     @on(Preview.PastRead)
     def _show_outcome(self) -> None:
-        cost, words, typed = "", "", True
+        cost = ""
+        words = ""
+        typed = True
         if self.preview.choice is not None or not self.preview.awaited:
             try:
                 choice, scenario = self._asked()
                 command = self._command(choice, scenario)
-                words, typed = shlex.join(command) or NO_COMMAND, bool(command)
+                words = shlex.join(command) or NO_COMMAND
+                typed = bool(command)
                 cost = whole_cost(scenario, choice.models, self.form.jobs, self.preview.past)
             except UserError as error:
                 cost = f"not ready: {error}"
@@ -223,7 +228,8 @@ class SetupScreen(Screen[None]):
 
     def _asked(self) -> tuple[Choice, Scenario]:
         """The choice, and its scenario with the form's settings. Raises UserError while there is none."""
-        choice, (pair, algorithm) = self.preview.choice, self.form.method
+        choice = self.preview.choice
+        (pair, algorithm) = self.form.method
         if choice is None:
             awaited = "the world is still being read: try again in a moment"
             raise UserError(awaited if self.preview.awaited else "choose a scenario or a world that can be read")
@@ -261,7 +267,8 @@ class SetupScreen(Screen[None]):
         try:
             choice, scenario = self._asked()
             path = run_file(scenario.name, str(form.value(form.NAME, texts[form.NAME.name])))
-            jobs, mode = self.form.jobs, texts["accept"]
+            jobs = self.form.jobs
+            mode = texts["accept"]
         except UserError as error:
             self._complain(error)
             return
@@ -316,7 +323,8 @@ class SetupScreen(Screen[None]):
 
     def _arrange(self) -> None:
         # Not by classes of the screen: these would compute all styles again.
-        (width, height), pane = self.size, self._pane
+        (width, height) = self.size
+        pane = self._pane
         all = width >= ROOMY[0] and height >= ROOMY[1]
         fits = width >= SMALLEST[0] and height >= SMALLEST[1]
         self.form.display = fits

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 NO_COMMAND = "there is no command for the scenario of a run; save it as a file first (f7)"
 # The maximum number of runs to read, and how many of the same scenario are enough.
-LOOKED_AT, ENOUGH = 30, 3
+LOOKED_AT = 30
+ENOUGH = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,11 +79,14 @@ def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
     if budget is not None:
         low, middle, high = (min(each, budget) for each in (low, middle, high))
     words = f"about {count(rounded(middle), 'test')} ({between(low, high)})"
-    baseline, search, certificate = reduction.baseline_runs, rounded(rough.search[1]), rounded(rough.certificate[1])
+    baseline = reduction.baseline_runs
+    search = rounded(rough.search[1])
+    certificate = rounded(rough.certificate[1])
     parts = f"{baseline} for the baseline, {search} for the search, {certificate} for the certificate"
     if budget is not None and middle >= budget:
         # The certificate may not be reached.
-        words, parts = f"{count(budget, 'test')} at most", f"{baseline} for the baseline, then the search"
+        words = f"{count(budget, 'test')} at most"
+        parts = f"{baseline} for the baseline, then the search"
     rare = "; more if the failure is rare" if past.rate is None else ""
     if past.seconds is None:
         return f"{words}: {parts}{rare}"
@@ -97,10 +101,12 @@ def command_words(choice: Choice, asked: Scenario, jobs: int, name: str = "") ->
     """
     from ddenv.world.load import SCENARIOS
 
-    before, after = choice.settings.model_dump(mode="json"), asked.model_dump(mode="json")
+    before = choice.settings.model_dump(mode="json")
+    after = asked.model_dump(mode="json")
     bundled = choice.path.parent == SCENARIOS and choice.path.suffix == ".yaml"
     words = ["ddenv", "run", choice.path.stem if bundled else str(choice.path.absolute())]
-    own, places = form.places_of(choice.settings), form.places_of(asked)
+    own = form.places_of(choice.settings)
+    places = form.places_of(asked)
     for option, fields in (("spawn", form.SPAWN), ("goal", form.GOAL)):
         if choice.bare or any(places[one.name] != own[one.name] for one in fields):
             words.append(f"--{option}={','.join(number_text(places[one.name]) for one in fields)}")

@@ -32,7 +32,8 @@ class Observed(RunFile):
     def __init__(self, path: Path, strictly: bool = False) -> None:
         if not path.is_file():
             raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
-        self.path, self._strictly = path, strictly
+        self.path = path
+        self._strictly = strictly
         self._origin = _place(path)
         self._version = 0
         self._place = self._origin
@@ -50,7 +51,8 @@ class Observed(RunFile):
             self._open(place)
             return True
         version = int(self._all("PRAGMA data_version")[0][0])
-        changed, self._version = version != self._version, version
+        changed = version != self._version
+        self._version = version
         return changed
 
     def send(self, kind: str, **data: Any) -> int:
@@ -97,7 +99,8 @@ _Place = tuple[int, int, bool, bool, tuple[int, int]]
 
 
 def _place(path: Path) -> _Place:
-    file, log = _stat(path), _stat(f"{path}-wal")
+    file = _stat(path)
+    log = _stat(f"{path}-wal")
     if file is None:
         return 0, 0, False, False, (0, 0)
     shared = log is not None and _stat(f"{path}-shm") is not None

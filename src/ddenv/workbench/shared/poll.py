@@ -97,24 +97,28 @@ class Poll:
 
     def _read(self) -> Snapshot:
         """Reads as much as makes sense of a damaged file, with what is wrong. Raises Busy."""
-        engine, last = self._engine(), self._snapshot
+        engine = self._engine()
+        last = self._snapshot
         if last is not None and not self._behind:
             # The time goes on.
             spent = self._spent(engine)
             return last if (engine, spent) == (last.engine, last.spent) else replace(last, engine=engine, spent=spent)
         error, more = self._follow()
-        state, spent = self._state, self._spent(engine)
+        state = self._state
+        spent = self._spent(engine)
         try:
             live, due = self._poses(state) if engine == "alive" else ((), True)
             # The robot's paths on the last similar run and in f, each read once.
-            ways, known = (state.evidence_test, None if state.f_test is None else state.f_test.id), self._motions
+            ways = (state.evidence_test, None if state.f_test is None else state.f_test.id)
+            known = self._motions
             self._motions = {test: known[test] if test in known else self.file.motion(test) for test in ways if test}
             evidence, original = (self._motions.get(test or 0) for test in ways)
             snapshot = Snapshot(state, live, engine, evidence, spent, error, original)
         except Busy:
             raise
         except UserError as trouble:
-            snapshot, due = Snapshot(state, (), engine, None, spent, error or str(trouble)), True
+            snapshot = Snapshot(state, (), engine, None, spent, error or str(trouble))
+            due = True
         self._behind = more or not due
         self._catching_up = more
         return replace(snapshot, behind=more, version=__version__)
@@ -123,7 +127,8 @@ class Poll:
         """Reads new events up to the first invalid one; what is wrong with that, and whether there are more. Raises Busy."""
         from ddenv.runfile.fold import steps
 
-        begun, more = time.monotonic(), True
+        begun = time.monotonic()
+        more = True
         try:
             while more:
                 more = False
@@ -145,7 +150,8 @@ class Poll:
             alive = engine_is_alive(self.path)
             # Rows of running tests are read only while an engine is there.
             self._behind = self._behind or alive != self._alive
-            self._looked, self._alive = moment, alive
+            self._looked = moment
+            self._alive = alive
         if self._alive:
             return "alive"
         return "starting" if self._starting() else "absent"

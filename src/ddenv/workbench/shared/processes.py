@@ -37,7 +37,8 @@ class Engine:
             self._process = start_engine(self.run, max(1, jobs), accept_mode=accept_mode, attended="yes", **options)
         except OSError as error:
             raise UserError(f"{self.run}: the engine cannot be started: {error.strerror}") from None
-        self._worked, self._last_words = False, ""
+        self._worked = False
+        self._last_words = ""
 
     def seen_at_work(self) -> None:
         """It has the run's lock: from now on the lock shows whether it is alive."""
@@ -110,7 +111,9 @@ class Scene:
             self.trouble = f"the scene did not start: {last_line(log) or f'see {log}'}"
 
     def stop(self) -> None:
-        process, self._process, self.url = self._process, None, ""
+        process = self._process
+        self._process = None
+        self.url = ""
         if process is None:
             return
         process.terminate()

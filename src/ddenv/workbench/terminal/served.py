@@ -62,7 +62,8 @@ def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None
             return app
 
         async def on_startup(self, app: Any) -> None:
-            size, user = "" if font_size == FONT_SIZE else f"?fontsize={font_size}", getpass.getuser()
+            size = "" if font_size == FONT_SIZE else f"?fontsize={font_size}"
+            user = getpass.getuser()
             lines = (
                 f"The workbench is at http://{HOST}:{port}/{token}/{size} (ctrl+c ends it).",
                 f"Anyone with that address acts as {user} on this machine: the workbench can read, write and start "

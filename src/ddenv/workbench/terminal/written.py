@@ -44,13 +44,15 @@ class Written:
         """The codes to write, which then count as written."""
         found = []
         for x, y, strip in _pieces(update):
-            width, row = strip.cell_length, self._rows.setdefault(y, [])
+            width = strip.cell_length
+            row = self._rows.setdefault(y, [])
             row += [None] * (x + width - len(row))
             cells: list[Cell] = [(char, style) for text, style, _ in strip for char in text]
             # Terminals do not agree on which characters are wide: a piece with these is always written as a whole.
             single = all(char.isascii() or cell_len(char) == 1 for char in set(strip.text))
             plain = len(cells) == width and strip.text.isprintable() and single
-            before, row[x : x + width] = row[x : x + width], cells if plain else [None] * width
+            before = row[x : x + width]
+            row[x : x + width] = cells if plain else [None] * width
             for first, last in _differing(before, cells) if plain else [(0, width)]:
                 found.append(f"\x1b[{y + 1};{x + first + 1}H{strip.crop(first, last).render(console)}")
         return "".join(found)
@@ -60,7 +62,8 @@ class _Fewer(CompositorUpdate):
     """An update that writes fewer cells; if it cannot be read, Textual draws it in full."""
 
     def __init__(self, written: Written, update: ChopsUpdate | LayoutUpdate) -> None:
-        self._written, self._update = written, update
+        self._written = written
+        self._update = update
 
     def render_segments(self, console: Console) -> str:
         try:

@@ -59,9 +59,12 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
     claims = {} if certificate is None else {each.without: each for each in certificate.claims}
     listed = found[:LISTED]
     snapshot = snapshot_with(state, state.environment, tuple(each.gone for each in listed))
-    models, last = [], []
+    models = []
+    last = []
     for number, each in enumerate(listed):
-        claim, sign, ways = claims.get(each.without), partition_letter(number), ("with", "without")
+        claim = claims.get(each.without)
+        sign = partition_letter(number)
+        ways = ("with", "without")
         rates = (
             f"{rate(claim)}; {meaning(claim, certificate)}." if claim is not None and certificate is not None else ""
         )
@@ -69,7 +72,8 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
         models.append(Entry(each.without, sign, each.gone, sentence(each), more, each.parting, ways, snapshot, claim))
     if (one := nearest(file, state)) is not None:
         # The whole world fails, and without these it passes.
-        whole, ways = snapshot_with(state, state.elements, (one.gone,) if one.gone else ()), ("fails", "passes")
+        whole = snapshot_with(state, state.elements, (one.gone,) if one.gone else ())
+        ways = ("fails", "passes")
         last = [Entry(NEAREST, "A", one.gone, one.sentences, (), one.parting, ways, whole)]
     return (*models, *last, *_of_numbers(file, state)), len(found) - len(listed)
 
@@ -81,15 +85,18 @@ def _of_numbers(file: RunFile, state: RunState) -> Iterator[Entry]:
     # What needs NumPy comes after the first paint.
     from ddenv.map.footprints import rings
 
-    snapshot, run = snapshot_with(state, state.environment, ()), attach_name(file.path)
+    snapshot = snapshot_with(state, state.environment, ())
+    run = attach_name(file.path)
     for one in changes(file, state, read_parts(file)[1]):
-        value, given = f"{one.value:.4g}", "".join(f" --margin {quote(f'{name}={to:.9g}')}" for name, to in one.changes)
+        value = f"{one.value:.4g}"
+        given = "".join(f" --margin {quote(f'{name}={to:.9g}')}" for name, to in one.changes)
         more = (
             f"Again: ddenv test {run} --minimal{given} --repeat 10",
             f"As a world: ddenv export {run}{given} --output changed.sdf",
         )
         limits = tuple((verdict, ring) for verdict, model, moved in one.limits for ring in rings(model, moved))
-        figures, ways = f"{'goal' if one.verdict == 'goal' else 'no f'} at {value}", ("now", f"at {value}")
+        figures = f"{'goal' if one.verdict == 'goal' else 'no f'} at {value}"
+        ways = ("now", f"at {value}")
         yield Entry(one.name, "", (), one.sentence, more, one.parting, ways, snapshot, None, limits, figures)
 
 
@@ -141,7 +148,8 @@ def head_of(state: RunState, works: bool) -> str:
 def nothing_yet(state: RunState, works: bool, run: str) -> str:
     """Why there is nothing to show, and what to do; `works`: an engine does. `run` is what a shell calls the run."""
     shows = "Full runs of what is left, with and without each of its models, show why: the certificate makes them."
-    making, command = in_the_making(state), remedy(state, works, run)
+    making = in_the_making(state)
+    command = remedy(state, works, run)
     if (certificate := current(state)) is not None:
         return no_reasons(certificate)
     if command:

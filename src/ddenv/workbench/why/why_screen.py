@@ -44,7 +44,9 @@ FIRST = ids("why", "help close play isolate margins copy signs closer farther fi
 
 
 # What the key of isolation does, as the footer says.
-BEGIN, GO_ON, STOP = "world that passes", "go on", "stop"
+BEGIN = "world that passes"
+GO_ON = "go on"
+STOP = "stop"
 
 
 class WhyScreen(Screen[None]):
@@ -85,7 +87,11 @@ class WhyScreen(Screen[None]):
         ask: Callable[[Isolate | Stop], None],
     ) -> None:
         super().__init__()
-        self._file, self._position, self._place, self._engine, self._ask = file, position, place, look, ask
+        self._file = file
+        self._position = position
+        self._place = place
+        self._engine = look
+        self._ask = ask
         self._seen: tuple[object, ...] = ()
         self._trouble = ""
         self._state = RunState()
@@ -127,12 +133,14 @@ class WhyScreen(Screen[None]):
 
     def _look(self) -> None:
         """Reads all again once there is another certificate, or another nearest world that passes."""
-        state, (works, trouble) = self._position.now, self._engine()
+        state = self._position.now
+        (works, trouble) = self._engine()
         self.query_one("#why-header", Static).update(
             Text(f" {plain(head_of(state, works))}", no_wrap=True, overflow="ellipsis")
         )
         # What the key of isolation does.
-        begun, known = state.isolating is not None, state.isolated is not None
+        begun = state.isolating is not None
+        known = state.isolated is not None
         does = (STOP if works else GO_ON) if begun else "" if known else BEGIN
         self.query_one(KeyFooter).say("why.isolate", does)
         if trouble and trouble != self._trouble:
@@ -144,7 +152,8 @@ class WhyScreen(Screen[None]):
         seen = current(state), state.isolated, margins, works, state.status, 0 if known else state.tests_done
         if seen == self._seen:
             return
-        self._seen, self._state = seen, state
+        self._seen = seen
+        self._state = state
         if known:
             self._read(state)
         else:
@@ -154,7 +163,8 @@ class WhyScreen(Screen[None]):
     def _read(self, state: RunState) -> None:
         """Comparing the ways of many runs takes a while."""
         found: tuple[Entry, ...] = ()
-        more, trouble = 0, ""
+        more = 0
+        trouble = ""
         try:
             with Observed(self._file.path) as file:
                 found, more = entries(file, state)

@@ -31,7 +31,8 @@ class Entry(Input):
             self.cursor_position = 0
 
     def render_line(self, y: int) -> Strip:
-        strip, width = super().render_line(y), self.content_size.width
+        strip = super().render_line(y)
+        width = self.content_size.width
         if y or self.has_focus or cell_len(self.value) <= width:
             return strip
         return Strip.join([strip.crop(0, width - 1), Strip([Segment("…", self.rich_style)])])

@@ -31,7 +31,11 @@ class Lines(ScrollView, can_focus=True):
     ) -> None:
         """`nothing` is shown when there are no items; `clicked` is called with what a line shows that was clicked."""
         super().__init__(id=id)
-        self._line, self._nothing, self._tail, self._parts, self._clicked = line, nothing, tail, parts, clicked
+        self._line = line
+        self._nothing = nothing
+        self._tail = tail
+        self._parts = parts
+        self._clicked = clicked
         self.items: Sequence[Any] = ()
         # What each line is made of, and how many columns the items were taken apart for.
         self._rows: Sequence[Any] = ()
@@ -39,7 +43,8 @@ class Lines(ScrollView, can_focus=True):
 
     def show(self, items: Sequence[Any]) -> None:
         at_end = self.scroll_offset.y >= self.max_scroll_y
-        before, self.items = self.items, items
+        before = self.items
+        self.items = items
         if not self.size.width:
             # Not visible: the screen needs no new layout for each line.
             self._columns = 0
@@ -63,7 +68,8 @@ class Lines(ScrollView, can_focus=True):
         goes_on = goes_on and before[0] is self.items[0] and before[-1] is self.items[known - 1]
         new = self.items[known:] if goes_on else self.items
         rows = [row for item in new for row in self._parts(item, columns)]
-        self._rows, self._columns = [*self._rows, *rows] if goes_on else rows, columns
+        self._rows = [*self._rows, *rows] if goes_on else rows
+        self._columns = columns
 
     def on_resize(self) -> None:
         self._take_apart(())
@@ -81,7 +87,8 @@ class Lines(ScrollView, can_focus=True):
             self._clicked(self._rows[place])
 
     def render_line(self, y: int) -> Strip:
-        width, base = self.scrollable_content_region.width, self.rich_style
+        width = self.scrollable_content_region.width
+        base = self.rich_style
         place = y + self.scroll_offset.y
         if 0 <= place < len(self._rows):
             text = self._line(self._rows[place], width)

@@ -34,7 +34,10 @@ class Choice(ModalScreen[str]):
 
     def __init__(self, title: str, hints: str, text: str, **answers: str) -> None:
         super().__init__()
-        self._title, self._hints, self._text, self._answers = title, hints, text, answers
+        self._title = title
+        self._hints = hints
+        self._text = text
+        self._answers = answers
 
     def compose(self) -> ComposeResult:
         with Framed(self._title, self._hints):

@@ -204,7 +204,9 @@ def _rotation(x: float, y: float, z: float, angle: float) -> np.ndarray:
     length = math.hypot(x, y, z)
     if length == 0:
         return np.eye(3)
-    x, y, z = x / length, y / length, z / length
+    x = x / length
+    y = y / length
+    z = z / length
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     # Rodrigues' formula.
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * (cross @ cross))

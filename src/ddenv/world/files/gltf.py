@@ -21,7 +21,9 @@ from ddenv.world.files.triangles import MOST_PARTS, Part, check_count, parts_of
 # Accepted accessors of positions (32-bit floats) and of vertex indices (8, 16 and 32 bits).
 _POSITIONS = ("VEC3", (5126,))
 _INDICES = ("SCALAR", (5121, 5123, 5125))
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_TRIANGLES = 4
+_STRIP = 5
+_FAN = 6
 _PLACE = ("children", "matrix", "translation", "rotation", "scale")
 # Replaces accessors that are not read.
 _NOTHING = {"componentType": 5126, "count": 0, "type": "SCALAR"}
@@ -47,7 +49,8 @@ def read_gltf(data: bytes, folder: Path, limit: int) -> list[Part]:
     scene = trimesh.load_scene(BytesIO(text), "glb" if is_binary else "gltf", resolver=buffers, process=False)
     # trimesh appends random letters to the names of nodes with several primitives.
     placed = [(int(mesh.metadata["node"].partition("_")[0]), mesh) for mesh in scene.dump()]
-    nodes, meshes = header["nodes"], header["meshes"]
+    nodes = header["nodes"]
+    meshes = header["meshes"]
     return parts_of(
         ((str(nodes[number].get("name", "")), str(meshes[nodes[number]["mesh"]].get("name", ""))), mesh)
         for number, mesh in sorted(placed, key=lambda pair: pair[0])
@@ -69,7 +72,9 @@ def _shape(header: Data, limit: int) -> Data:
     """The header reduced to triangles and their transforms; a node's name is its number. Raises ValueError."""
     if compressed := [name for name in header.get("extensionsRequired", []) if "compress" in name]:
         raise ValueError(f"{compressed[0][:60]} is not supported; save it without compression")
-    accessors, views, nodes = header["accessors"], header["bufferViews"], header["nodes"]
+    accessors = header["accessors"]
+    views = header["bufferViews"]
+    nodes = header["nodes"]
     # numpy would count negative numbers from the end, and trimesh would drop such a mesh.
     counts = ("byteOffset", "byteLength", "count", "mesh")
     if any(each.get(key, 0) < 0 for each in (*accessors, *views, *nodes) for key in counts):
@@ -108,7 +113,8 @@ def _shape(header: Data, limit: int) -> Data:
 def _primitives(mesh: Data, accessors: list[Data]) -> Iterator[Data]:
     """The triangle primitives of a mesh, without normals, colours and materials. Raises ValueError."""
     for primitive in mesh["primitives"]:
-        mode, position = primitive.get("mode", _TRIANGLES), primitive["attributes"].get("POSITION")
+        mode = primitive.get("mode", _TRIANGLES)
+        position = primitive["attributes"].get("POSITION")
         if mode == _FAN:
             raise ValueError("triangle fans are not supported")
         if mode not in (_TRIANGLES, _STRIP) or position is None:

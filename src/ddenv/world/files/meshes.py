@@ -218,7 +218,8 @@ def _qhull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _unit(points: np.ndarray) -> np.ndarray:
     """`points` stretched to the cube from -1 to 1, which suits Qhull's tolerances; a hull stays a hull."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     half = np.where(high > low, (high - low) / 2, 1.0)
     return np.asarray((points - (low + high) / 2) / half)
 
@@ -227,12 +228,14 @@ def _extremes(points: np.ndarray) -> np.ndarray:
     """Indices of the extreme points in `MOST_VERTICES` directions: a spiral on the sphere, and the axes, for the bounding box."""
     points = _unit(points)
     directions: list[Vector] = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
-    turn, rest = math.pi * (3 - math.sqrt(5)), MOST_VERTICES - len(directions)
+    turn = math.pi * (3 - math.sqrt(5))
+    rest = MOST_VERTICES - len(directions)
     for number in range(rest):
         height = 1 - (2 * number + 1) / rest
         ring = math.sqrt(1 - height * height)
         directions.append((ring * math.cos(turn * number), ring * math.sin(turn * number), height))
-    best, places = [-math.inf] * len(directions), [0] * len(directions)
+    best = [-math.inf] * len(directions)
+    places = [0] * len(directions)
     # In chunks that stay in the processor's cache.
     for start in range(0, len(points), CHUNK):
         chunk = np.asfortranarray(points[start : start + CHUNK])
@@ -240,7 +243,8 @@ def _extremes(points: np.ndarray) -> np.ndarray:
             along = _along(chunk, direction)
             place = int(along.argmax())
             if along[place] > best[number]:
-                best[number], places[number] = float(along[place]), start + place
+                best[number] = float(along[place])
+                places[number] = start + place
     return np.unique(places)
 
 

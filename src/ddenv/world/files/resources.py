@@ -178,7 +178,8 @@ class Resources:
             name = model_named(uri)
             if name not in _TEXTS:
                 raise
-            path, text = FOLDER / f"{name}.sdf", f"<sdf version='1.5'>{_TEXTS[name]}</sdf>".encode()
+            path = FOLDER / f"{name}.sdf"
+            text = f"<sdf version='1.5'>{_TEXTS[name]}</sdf>".encode()
         return str(path).encode("utf-8", "surrogateescape") + b"\0" + text
 
     def _parts(self, part: MeshPart) -> list[Part]:

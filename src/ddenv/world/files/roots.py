@@ -21,7 +21,8 @@ PLACES = {
 }
 VARIABLES = tuple(place for place in PLACES if not place.startswith("~"))
 # The folder of worlds in a package of ROS or Gazebo; that of its models is beside it.
-WORLDS, MODELS = "worlds", "models"
+WORLDS = "worlds"
+MODELS = "models"
 
 
 def search_roots(model_path: Sequence[Path], world_folder: Path) -> dict[Path, str]:

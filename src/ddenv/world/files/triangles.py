@@ -83,7 +83,8 @@ def read_obj(data: bytes) -> list[Part]:
     check_count(data.count(b"\nf "))
     vertices: list[list[str]] = []
     objects: dict[tuple[str, ...], list[tuple[int, int, int]]] = {}
-    name, group = "", ""
+    name = ""
+    group = ""
     for line in data.decode("utf-8", errors="replace").replace("\\\r\n", " ").replace("\\\n", " ").splitlines():
         word, *rest = line.partition("#")[0].split() or [""]
         if word == "v":
@@ -98,7 +99,8 @@ def read_obj(data: bytes) -> list[Part]:
             faces = objects.setdefault((name, group) if name else (group,), [])
             faces += [(first, second, third) for second, third in pairwise(others)]
         elif word == "o":
-            name, group = " ".join(rest), ""
+            name = " ".join(rest)
+            group = ""
         elif word == "g":
             group = " ".join(rest)
     points = np.array(vertices, dtype=float) if objects else np.zeros((0, 3))

@@ -46,7 +46,8 @@ QUIET: dict[str, frozenset[str]] = {
         "velocity_decay": "linear angular",
     }.items()
 }
-QUIET["axis2"], QUIET["add_model"] = QUIET["axis"], QUIET["include"]
+QUIET["axis2"] = QUIET["axis"]
+QUIET["add_model"] = QUIET["include"]
 ONCE = {"pose", "geometry", "inertial", "surface", "material", "static", "scale", "gravity", "self_collide", "density"}
 ONCE |= {"axis", "axis2", "parent", "child", "limit"}
 REASONS = {

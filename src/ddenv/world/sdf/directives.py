@@ -28,7 +28,8 @@ from ddenv.world.sdf.frames import FARTHEST
 Span = tuple[int, int]
 # Maximum number of directives: a few files that open each other could ask for more than any machine can hold.
 MOST = 50_000
-WORLD, WORLD_INSTANCE = "world", "WorldModelInstance"
+WORLD = "world"
+WORLD_INSTANCE = "WorldModelInstance"
 # The keys of each directive; those with a star are required.
 KEYS = {
     kind: tuple(keys.split())
@@ -103,7 +104,8 @@ class Source:
 
     def keys(self, node: Node, what: str, keys: tuple[str, ...]) -> dict[str, Node]:
         """The same with only `keys`, of which those with a star are required. Raises UserError."""
-        found, known = self.pairs(node), [key.lstrip("*") for key in keys]
+        found = self.pairs(node)
+        known = [key.lstrip("*") for key in keys]
         for key in found:
             if key not in known:
                 hint = f"{nearest(key, known)}; allowed are {', '.join(known)}"
@@ -242,7 +244,8 @@ def _open(source: Source, files: tuple[Path, ...], context: Context, found: list
 
 def _inner(one: Directive, files: tuple[Path, ...], context: Context) -> Source:
     """The directives that `one` opens. Raises UserError."""
-    node, source = one.keys["file"], one.source
+    node = one.keys["file"]
+    source = one.source
     uri = source.text_of(node)
     try:
         path, text = context.resources.sdf(uri, source.path.parent)
@@ -270,7 +273,8 @@ def spans_of(source: Source, listed: Any) -> list[tuple[Any, Span]]:
     before = listed.start_mark.index
     for item in listed.value:
         node, last = item if isinstance(item, tuple) else (item, item)
-        start, end = node.start_mark.index, _end(last)
+        start = node.start_mark.index
+        end = _end(last)
         if isinstance(listed, SequenceNode) and not listed.flow_style:
             dash = _DASH.search(source.text, before) if found else None
             # The list itself begins with the first dash, which may stand behind another one.
@@ -292,7 +296,8 @@ def _end(node: Any) -> int:
 
 def _flat(one: Directive) -> str:
     """A directive on one line, its names as seen from the outermost file."""
-    node, source = deepcopy(one.node), one.source
+    node = deepcopy(one.node)
+    source = one.source
     keys = source.pairs(source.pairs(node)[one.kind])
     groups = source.items(keys.get("member_groups"))
     groups += source.items(keys.get("ignored_collision_filter_groups"))

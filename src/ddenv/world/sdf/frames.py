@@ -70,7 +70,8 @@ class Scope:
         """The pose of the frame called `name`; errors point at `asker`. Raises UserError."""
         # A loop, since chains of frames may be longer than Python's stack.
         chain: dict[str, Pose] = {}
-        at, asked_by = name, asker
+        at = name
+        asked_by = asker
         while not (at in OWN or at in self._poses or (at == WORLD and self.element.tag != "model")):
             if at in chain:
                 raise complain(asker, f"the frames form a cycle: {shown([*list(chain)[list(chain).index(at) :], at])}")
@@ -93,9 +94,13 @@ class Scope:
                 return first, self.inside(part).pose(rest, asker), asker
             raise complain(asker, f"there is no frame '{name}' here{nearest(name, self.named)}")
         if isinstance(thing, Part):
-            element, holder, default = thing.pose, thing.at, ""
+            element = thing.pose
+            holder = thing.at
+            default = ""
         else:
-            element, holder, default = thing.find("pose"), thing, _carrier(thing)
+            element = thing.find("pose")
+            holder = thing
+            default = _carrier(thing)
         local = HERE if element is None else pose_of(element)
         local = self._by_placement_frame(thing, local) if isinstance(thing, Part) else local
         return _named_in(element) or default, local, holder if element is None else element
@@ -154,7 +159,8 @@ class Scope:
     @cached_property
     def canonical(self) -> str | None:
         """The link that a model's own frame is attached to: its `canonical_link`, else its first link."""
-        named, first = self.element.get("canonical_link"), self.element.find("link")
+        named = self.element.get("canonical_link")
+        first = self.element.find("link")
         if named:
             return None if named in OWN else self.link(named, self.element)
         if first is not None:

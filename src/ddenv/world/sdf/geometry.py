@@ -25,7 +25,8 @@ from ddenv.world.write import primitive
 
 SIDES = 32  # of a cone
 SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline", "heightmap")
-SMALLEST, LARGEST = 1e-6, 1e6  # m
+SMALLEST = 1e-6
+LARGEST = 1e6  # m
 # The sizes of each shape, m, by the elements that say them: libsdformat takes these where one is
 # missing.
 DEFAULT_SIZES: dict[str, dict[str, tuple[float, ...]]] = {
@@ -191,7 +192,8 @@ def _solid(part: MeshPart, element: Element, parent: Element, context: Context, 
     except (Missing, Unusable):
         shares = None
     if shares is not None:
-        low, high = hull.vertices.min(axis=0), hull.vertices.max(axis=0)
+        low = hull.vertices.min(axis=0)
+        high = hull.vertices.max(axis=0)
         context.note("replaced", element, f"'{part.uri}' by the solid ground below it")
         return _ground(part.uri, shares, vector(high - low), vector([*(low + high)[:2] / 2, low[2]]))
     pieces = context.resources.pieces(part, scale, most) if most > 1 else []

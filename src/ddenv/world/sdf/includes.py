@@ -142,7 +142,8 @@ def _file_root(include: Element, uri: str, context: Context) -> Element:
 
 
 def _note_replaced(include: Element, uri: str, by: str, context: Context) -> None:
-    outer, context.model = context.model, _model_of(include, uri, context)
+    outer = context.model
+    context.model = _model_of(include, uri, context)
     context.note("replaced", include, f"'{uri}' by {by}")
     context.model = outer
 

@@ -19,8 +19,10 @@ WATER = 1000.0  # kg/m^3, SDF's default density
 DEFAULT_MASS = 1.0  # kg, SDF's default for a link without an <inertial>
 # Radius of the ball that a link without shapes is taken for, m.
 BARE = 0.05
-LIGHTEST, HEAVIEST = 1e-9, 1e9  # accepted masses, kg
-THINNEST, DENSEST = 1e-3, 1e6  # accepted densities, kg/m^3
+LIGHTEST = 1e-9
+HEAVIEST = 1e9  # accepted masses, kg
+THINNEST = 1e-3
+DENSEST = 1e6  # accepted densities, kg/m^3
 LEAST_MOMENT = 1e-15  # minimum principal moment of inertia, kg m^2
 # Drake's contacts cannot be solved for a link that turns or moves more easily than this mass, spread evenly over its shapes, kg.
 LIGHTEST_IN_CONTACT = 1e-5
@@ -146,7 +148,8 @@ def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose:
     middle = masses @ centers / total
     tensor = np.zeros((3, 3))
     for (_, _, unit, pose, _), each, center in zip(solids, masses, centers, strict=True):
-        rotation, arm = pose.rotation(), center - middle
+        rotation = pose.rotation()
+        arm = center - middle
         tensor += each * (rotation @ unit @ rotation.T + (arm @ arm) * np.eye(3) - np.outer(arm, arm))
     factor = 1.0 if mass is None else mass / total
     tensor *= factor
@@ -178,7 +181,8 @@ def solid(shape: Shape) -> tuple[float, np.ndarray, np.ndarray]:
         case Cylinder(radius, length):
             return math.pi * radius**2 * length, origin, _cylinder(radius, length)
         case Capsule(radius, length):
-            tube, balls = math.pi * radius**2 * length, 4 / 3 * math.pi * radius**3
+            tube = math.pi * radius**2 * length
+            balls = 4 / 3 * math.pi * radius**3
             # Two half balls, each with its centre of mass 3/8 r beyond the end of the tube.
             across = 0.4 * radius**2 + length**2 / 4 + 3 / 8 * length * radius
             unit = tube * _cylinder(radius, length) + balls * np.diag([across, across, 0.4 * radius**2])

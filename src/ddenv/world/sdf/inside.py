@@ -29,7 +29,8 @@ def opened(world: World, root: Element) -> World:
     """`world` with the collisions of its models as models; `root` is the XML of its text."""
     at = {element.start: element for element in root.iter() if element.tag in ("model", "include")}
     models: list[Model] = []
-    shared, notes = list(world.shared), list(world.notes)
+    shared = list(world.shared)
+    notes = list(world.notes)
     taken = set(world.names)
     for model in world.models:
         element = at[model.spans[0][0]]

@@ -47,7 +47,8 @@ def read_joints(spot: Spot, links: dict[str, LinkPose], context: Context) -> lis
 
     Raises UserError.
     """
-    joints, names = [], set()
+    joints = []
+    names = set()
     for element in spot.scope.element.findall("joint"):
         note_unread(element, context)
         if name_of(element) in names:
@@ -115,7 +116,9 @@ def _axis(axis: Element | None, spot: Spot, joint_pose: Pose) -> Vector:
     """The unit vector of an `<axis>` in the world frame, at the nominal poses."""
     if axis is None:
         return joint_pose.rotate((0.0, 0.0, 1.0))
-    frame, unit, element = joint_pose, (0.0, 0.0, 1.0), axis.find("xyz")
+    frame = joint_pose
+    unit = (0.0, 0.0, 1.0)
+    element = axis.find("xyz")
     if version(axis) < (1, 7) and truth(axis, "use_parent_model_frame", version(axis) < (1, 5)):
         frame = spot.nominal
     if element is not None:
@@ -163,7 +166,8 @@ def _relative_to_start(joint: Joint, axis: Vector, links: dict[str, LinkPose]) -
 
 def _note_unread(element: Element, kind: str, context: Context) -> None:
     for axis in (each for each in (element.find("axis"), element.find("axis2")) if each is not None):
-        limit, old = axis.find("limit"), axis.find("use_parent_model_frame")
+        limit = axis.find("limit")
+        old = axis.find("use_parent_model_frame")
         bounds = [] if limit is None else [*limit.iter("lower"), *limit.iter("upper")]
         if limit is not None and kind not in LIMITED and any(abs(sum(floats(one))) < UNLIMITED for one in bounds):
             context.note("ignored", limit, f"the limits of a {kind} joint")

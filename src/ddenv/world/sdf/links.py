@@ -61,13 +61,16 @@ def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local:
     for child in (child for child in element if child.tag in ("collision", "visual")):
         note_unread(child, context)
         name_of(child)
-        own, place = child.find("pose"), spot.scope.place(child)
+        own = child.find("pose")
+        place = spot.scope.place(child)
         if own is not None and (own.get("relative_to") or own.get("frame")):
             place = local.inverse() @ place
         items.append(_Item(child, place, read_shape(child, context, spot.scale)))
     inertial = element.find("inertial")
     usual = WATER if inertial is None else read_density(inertial, WATER)
-    collisions, density, visuals = [], [], []
+    collisions = []
+    density = []
+    visuals = []
     for item in items:
         if item.element.tag == "collision" and (placed := _settled(item, items, element, context)) is not None:
             solids = _collisions(item, placed, pose, context)
@@ -185,9 +188,11 @@ def read_friction(collision: Element, context: Context) -> float:
     for tag in DRAKE_MU:
         if own is not None and own.find(tag) is not None:
             return _friction(own, tag)
-    engine, names = collision.find("surface/friction/ode"), ("mu", "mu2")
+    engine = collision.find("surface/friction/ode")
+    names = ("mu", "mu2")
     if engine is None:
-        engine, names = collision.find("surface/friction/bullet"), ("friction", "friction2")
+        engine = collision.find("surface/friction/bullet")
+        names = ("friction", "friction2")
     if engine is None:
         return DEFAULT_MU
     first, second = (_friction(engine, name) for name in names)

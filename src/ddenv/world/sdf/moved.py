@@ -85,7 +85,8 @@ def _saved(text: bytes, entry: Element, links: Mapping[str, Pose], turn: Pose, p
     if own is not None:
         yield _replaced(text, own, turn @ pose_of(own))
     for link in entry.findall("link"):
-        there, pose = links.get(prefix + name_of(link)), link.find("pose")
+        there = links.get(prefix + name_of(link))
+        pose = link.find("pose")
         if there is not None and pose is not None:
             yield _replaced(text, pose, there)
     for inner in entry.findall("model"):

@@ -65,7 +65,8 @@ def _up_to(unit: str, matters: float, most: float) -> Kind:
 _PLACE = Kind("m", 0.01, lambda now, length: (now - 3.0 * length, now + 3.0 * length))
 _HEIGHT = Kind("m", 0.01, lambda now, length: (now - length, now + length))
 _ANGLE = Kind("rad", math.radians(1.0), lambda now, _: (now - math.pi, now + math.pi))
-_SIZE, _ERROR = _times("m", 0.1, 3.0), _up_to("", 0.005, 0.5)
+_SIZE = _times("m", 0.1, 3.0)
+_ERROR = _up_to("", 0.005, 0.5)
 # An option of an own controller: what it means, only its author knows.
 _OPTION = Kind(
     "", 1e-6, lambda now, _: (min(0.1 * now, 10.0 * now), max(0.1 * now, 10.0 * now)) if now else (-1.0, 1.0)
@@ -176,14 +177,16 @@ def _of_model(world: World, model: Model, what: str) -> float | None:
 
 def changed(scenario: Scenario, world: World, changes: Mapping[str, float]) -> tuple[Scenario, World]:
     """The scenario and the world with these values of numbers. Raises NotPossible."""
-    data, of_scenario = scenario.model_dump(), False
+    data = scenario.model_dump()
+    of_scenario = False
     for name, value in changes.items():
         if name not in OF_SCENARIO and not name.startswith(OPTIONS):
             world = _with(scenario, world, name, value)
             continue
         own = ("controller", "options", name.removeprefix(OPTIONS))
         *keys, last = OF_SCENARIO[name][1] if name in OF_SCENARIO else own
-        section, of_scenario = data, True
+        section = data
+        of_scenario = True
         for key in keys:
             section = section[key]
         section[last] = round(value) if isinstance(section[last], int) else value
@@ -200,7 +203,8 @@ def part_of(
 
     A simulator of the user's own leaves models out of the world's text itself. Raises NotPossible.
     """
-    gone, whole = set(world.elements(scenario.protected)) - kept, whole_of(world, scenario)
+    gone = set(world.elements(scenario.protected)) - kept
+    whole = whole_of(world, scenario)
     scenario, world = changed(scenario, world, changes)
     if scenario.oracle is None:
         world = replace(world, models=tuple(model for model in world.models if model.name not in gone))
@@ -220,7 +224,8 @@ def check(scenario: Scenario, world: World, robot: Model, kept: frozenset[str], 
         raise NotPossible(found[0])
     owners = {name.rpartition(".")[0] for name in changes if name not in OF_SCENARIO} & kept
     for owner, other in product(sorted(owners), after.models):
-        before, model = world.model(owner), after.model(owner)
+        before = world.model(owner)
+        model = after.model(owner)
         # What stands on the ground may sink into it, and two that never move push nothing apart.
         if other.name == owner or (model.static and is_ground(other)):
             continue
@@ -235,7 +240,8 @@ def _with(scenario: Scenario, world: World, name: str, value: float) -> World:
     owner, _, what = name.rpartition(".")
     model = world.model(owner)
     at = next(one for one in parse(world.text, world.path).iter() if one.start == model.spans[0][0])
-    number, pose = f"{value:.9g}", at.find("pose")
+    number = f"{value:.9g}"
+    pose = at.find("pose")
     words = text_of(pose).split()
     if what == "friction":
         edits = [edit for collision in at.iter("collision") for edit in _friction(world.text, collision, number)]
@@ -273,7 +279,8 @@ def _sizes(world: World, model: Model, at: Element, what: str, number: str) -> I
     now = _of_model(world, model, what)
     tag, place = ("size", "xyz".index(what[-1])) if what in SIZES[2:] else (what, 0)
     for element in at.iter(tag):
-        values, words = floats(element), text_of(element).split()
+        values = floats(element)
+        words = text_of(element).split()
         of_shape = element.parent is not None and element.parent.tag in ("box", "cylinder", "sphere")
         if len(values) > place and values[place] == now and (of_shape or what == "mass"):
             yield with_words(world.text, element, " ".join([*words[:place], number, *words[place + 1 :]]))
@@ -288,7 +295,8 @@ def _friction(text: bytes, collision: Element, number: str) -> Iterator[Edit]:
             if lacks := "".join(f"<{tag}>{number}</{tag}>" for tag, each in said.items() if each is None):
                 yield with_child(text, holder, lacks)
             return
-    holder, new = collision, f"<ode><mu>{number}</mu><mu2>{number}</mu2></ode>"
+    holder = collision
+    new = f"<ode><mu>{number}</mu><mu2>{number}</mu2></ode>"
     for path, tag in (("surface/friction", "friction"), ("surface", "surface")):
         if (found := collision.find(path)) is not None:
             holder = found

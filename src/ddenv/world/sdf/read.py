@@ -145,7 +145,8 @@ def _opened(world: World, root: Element, scope: Scope, context: Context) -> Worl
 def _models(scope: Scope, state: dict[str, list[Element]], context: Context) -> tuple[Model, ...]:
     """The models of a world, but for those that are too far away to be simulated."""
     names = [part.name for part in scope.parts]
-    counts, models = Counter(names), []
+    counts = Counter(names)
+    models = []
     for part, name in zip(scope.parts, unique_names(names, " #"), strict=True):
         context.model = name
         if scope.is_left_out(part):

@@ -31,7 +31,8 @@ SHAPES: dict[str, Callable[..., Shape]] = {
     "ellipsoid": lambda x, y, z: Ellipsoid((x / 2, y / 2, z / 2)),
 }
 SIBLINGS = ("visual", "collision")
-AUTO, NONE = "auto", "none"
+AUTO = "auto"
+NONE = "none"
 # In place of a URI: everything that is missing.
 ALL_MISSING = "*"
 LARGEST = 1e6  # m
@@ -71,7 +72,8 @@ def parse_option(option: str) -> tuple[str, str]:
     if not sign or not uri.strip():
         example = "model://barrel=cylinder:0.3,1.0"
         raise UserError(f"--stand-in: expected URI=SHAPE, such as {example}, or auto; found '{option}'")
-    uri, text = uri.strip(), text.strip()
+    uri = uri.strip()
+    text = text.strip()
     parse_stand_in(text, "--stand-in")
     parse_stand_ins({uri: text})
     return uri, text

@@ -43,7 +43,8 @@ def to_sdf(robot: Element, context: Context) -> Element:
     links = {name_of(link): link for link in robot.findall("link")}
     if not links:
         raise complain(robot, "has no <link>")
-    origins, joints = {}, []
+    origins = {}
+    joints = []
     for source in robot.findall("joint"):
         parent, child = (_end(source, tag, links) for tag in ("parent", "child"))
         origins[child] = pose(source, parent)
@@ -178,7 +179,9 @@ def joint_of(source: Element, parent: str, child: str) -> Element:
     made = twin(source, *ends, name=name_of(source), type=kind)
     if kind == "fixed":
         return made
-    own, limit, dynamics = source.find("axis"), source.find("limit"), source.find("dynamics")
+    own = source.find("axis")
+    limit = source.find("limit")
+    dynamics = source.find("dynamics")
     if kind in LIMITED and limit is None:
         raise complain(source, f"a {kind} joint needs a <limit>")
     xyz = "1 0 0" if own is None else three(own, "xyz", "1 0 0")
@@ -198,7 +201,10 @@ def element(tag: str, source: Element, text: str = "", *children: Element, **att
     made = Element(tag, attributes)
     made.text = text
     made.extend(children)
-    made.source, made.line, made.start, made.end = source.source, source.line, source.start, source.end
+    made.source = source.source
+    made.line = source.line
+    made.start = source.start
+    made.end = source.end
     made.parent = source
     return made
 

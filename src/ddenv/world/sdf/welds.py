@@ -81,7 +81,8 @@ class _Builder:
 
     def take(self, one: Directive) -> None:
         """Adds what `one` says. Raises UserError."""
-        source, keys = one.source, one.keys
+        source = one.source
+        keys = one.keys
         match one.kind:
             case "add_model":
                 self._add_model(one)
@@ -116,10 +117,12 @@ class _Builder:
         return name
 
     def _add_model(self, one: Directive) -> None:
-        source, keys = one.source, one.keys
+        source = one.source
+        keys = one.keys
         name = self._new_model(one)
         at = source.path, int(one.node.start_mark.line) + 1, one.span
-        include, uri = _element("add_model", *at), _element("uri", *at)
+        include = _element("add_model", *at)
+        uri = _element("uri", *at)
         uri.text = source.text_of(keys["file"])
         include.set("name", name)
         include.append(uri)
@@ -191,8 +194,10 @@ class _Builder:
             self.spans[owner].append(one.span)
 
     def _fix(self, fixing: Fixing) -> None:
-        name, link = fixing.own.model, fixing.own.link
-        group, model = self.groups[name, link], self.models[name]
+        name = fixing.own.model
+        link = fixing.own.link
+        group = self.groups[name, link]
+        model = self.models[name]
         before = self.fixings.get(group)
         held = {self.groups[name, joint.child] for joint in model.joints if joint.parent == WORLD}
         if model.static or group in held:
@@ -253,9 +258,11 @@ class _Builder:
             elif base.model and not _holds(self.finish(base.model), base.link):
                 if name in self.carriers:
                     raise fixing.complain(f"'{name}' is welded to two models that can move")
-                outer, parent = base.model, base.link
+                outer = base.model
+                parent = base.link
                 if outer in self.carriers:
-                    outer, parent = self.carriers[outer][0], f"{outer}::{parent}"
+                    parent = f"{outer}::{parent}"
+                    outer = self.carriers[outer][0]
                 weld = replace(
                     weld,
                     name=f"{name}::{weld.name}",
@@ -277,7 +284,8 @@ class _Builder:
         """The models in the order of their directives, each with those that are parts of it. Raises UserError."""
         made = {name: self.finish(name) for name in self.models}
         for name, (outer, weld) in self.carriers.items():
-            part, whole = made.pop(name), made[outer]
+            part = made.pop(name)
+            whole = made[outer]
             joints = [
                 replace(
                     joint,
@@ -381,7 +389,9 @@ def parse_directives(text: bytes, path: Path, context: Context) -> World:
 def _element(tag: str, path: Path, line: int = 1, span: Span = (0, 0)) -> Element:
     """An element at the place of a directive, for all that reads SDF."""
     made = Element(tag)
-    made.source, made.line, made.parent = path, line, None
+    made.source = path
+    made.line = line
+    made.parent = None
     made.start, made.end = span
     return made
 
@@ -444,7 +454,8 @@ def _moved_link(link: Link, by: Pose) -> Link:
 def _moved_joint(joint: Joint, by: Pose, position: float = 0.0) -> Joint:
     """`joint` moved with its child, which stands at `position` now: limits are relative to that."""
     second = None if joint.axis2 is None else by.rotate(joint.axis2)
-    lower, upper = joint.lower - position, joint.upper - position
+    lower = joint.lower - position
+    upper = joint.upper - position
     return replace(joint, pose=by @ joint.pose, axis=by.rotate(joint.axis), axis2=second, lower=lower, upper=upper)
 
 

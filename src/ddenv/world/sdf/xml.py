@@ -47,7 +47,8 @@ def with_child(text: bytes, holder: Element, new: str) -> Edit:
 
 def edited(text: bytes, edits: Sequence[Edit]) -> bytes:
     """`text` with some bytes replaced."""
-    parts, at = [], 0
+    parts = []
+    at = 0
     for start, end, new in sorted(edits):
         parts += [text[at:start], new]
         at = end
