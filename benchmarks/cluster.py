@@ -67,7 +67,7 @@ class Simulated:
         self.clock, test, fails, seed = heapq.heappop(self.running)
         rows = np.zeros((2, 8))
         rows[:, 4], rows[1, :2] = 1, (1, 2 if fails else 4)
-        return [(test, RunResult("failed" if fails else "pass", "stuck" if fails else "", rows, {}, 1.0, 0.01, seed))]
+        return [(test, RunResult(outcome="failed" if fails else "pass", failure="stuck" if fails else "", trajectory=rows, motions={}, simulated_seconds=1.0, wall_seconds=0.01, seed=seed))]
 
     def settle(self, elements: frozenset[str]):
         return lambda: Start([], Settled())

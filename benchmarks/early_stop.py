@@ -125,7 +125,7 @@ def both_runs(asked: Asked, ends: Ends) -> Both:
 def fixed(scenario: Scenario, results: list[RunResult]) -> Failure:
     """f as the engine fixes it from the runs of the whole world."""
     ran = [
-        Test(number, 0, "baseline", None, None, number, result.seed, result.outcome, end_pose=result.end_pose)
+        Test(id=number, environment=0, phase="baseline", round=None, candidate=None, run=number, seed=result.seed, outcome=result.outcome, end_pose=result.end_pose)
         for number, result in enumerate(results)
     ]
     trajectories = {number: result.trajectory for number, result in enumerate(results)}

@@ -71,7 +71,7 @@ class Sleeper:
         way[:, 0], way[:, 1], way[:, 4] = np.arange(450) / 10, np.linspace(-2, 1 if failed else 9, 450), 1
         seen = {f"crate {number}": 1.0 + number for number in range(10)}
         result = RunResult(
-            "failed" if failed else "pass", "stuck" if failed else "", way, {}, 45.0, self._seconds, seed, seen
+            outcome="failed" if failed else "pass", failure="stuck" if failed else "", trajectory=way, motions={}, simulated_seconds=45.0, wall_seconds=self._seconds, seed=seed, first_sensed=seen
         )
         os.write(self._log, f"{os.getpid()} {began} {time.monotonic()}\n".encode())
         return result
@@ -131,7 +131,7 @@ def work(run: Path, jobs: int, make: partial[Sleeper]) -> float:
         scenario, world, robot = read_parts(file)
         file.own()
         journal = Journal(file)
-        journal.record(EngineStarted(os.getpid(), jobs, __version__, "none"))
+        journal.record(EngineStarted(pid=os.getpid(), jobs=jobs, version=__version__, simulator="none"))
         control, pool = Control(journal, threading.Event()), Pool(scenario, world, robot, jobs, make)
         driver = Driver(scenario, world, journal, Bench(journal, pool, control), control)
         began = time.thread_time()

@@ -70,7 +70,7 @@ def write(path: Path, tests: int, models: int) -> None:
     }
     elements = list(parse_world(world, path).elements())
     documents = {"scenario": json.dumps(data).encode(), "world": world, "robot": ROBOT_SDF.encode()}
-    create(path, documents, Created(data, tuple(elements)))
+    create(path, documents, Created(scenario=data, elements=tuple(elements)))
     samples = way(width)
     with RunFile(path) as file:
         file.own()
@@ -101,44 +101,44 @@ def way(width: float) -> bytes:
 
 
 def events(tests: int, models: int, width: float) -> Iterator[Event]:
-    yield EngineStarted(1, 2, "0.1.0", "drake")
+    yield EngineStarted(pid=1, jobs=2, version="0.1.0", simulator="drake")
     runs = range(1, RUNS + 1)
     for test in runs:
-        yield TestStarted(test, 0, test - 1, test - 1, "baseline")
+        yield TestStarted(test=test, environment=0, run=test - 1, seed=test - 1, phase="baseline")
         yield ended(test, "similar", width)
     judged = Outcomes(dict.fromkeys(runs, "similar"), dict.fromkeys(runs, 0.1))
-    yield BaselineFinished(RUNS, RUNS, 1.0, 0.51, 1.0, 1, (width / 2, width / 2, 0.2), 0.0, 0, judged)
+    yield BaselineFinished(runs=RUNS, failures=RUNS, rate=1.0, low=0.51, high=1.0, failure_test=1, position=(width / 2, width / 2, 0.2), miss_chance=0.0, iterations_95=0, judged=judged)
     kept, here, environments, test, number = list(range(models)), 0, 1, RUNS + 1, 0
     while test <= tests:
         number += 1
         parts = [tuple(kept[len(kept) * part // PARTS : len(kept) * (part + 1) // PARTS]) for part in range(PARTS)]
         kinds = [(kind, part, 0.5 + part) for part in range(PARTS) for kind in ("partition", "complement")]
-        yield RoundStarted(number, PARTS, here, tuple(parts), tuple(kinds))
+        yield RoundStarted(round=number, n_partitions=PARTS, environment=here, partitions=tuple(parts), candidates=tuple(kinds))
         whole = Environment.of(kept)
         for candidate, (kind, part, _) in enumerate(kinds):
             runs = RUNS if candidate < 2 * PARTS - 1 else 1
             some = Environment.of(parts[part])
-            yield EnvironmentNamed(environments, some if kind == "partition" else whole - some)
+            yield EnvironmentNamed(environment=environments, models=some if kind == "partition" else whole - some)
             yield from tried(number, candidate, environments, range(test, test + runs), width)
             test, environments = test + runs, environments + 1
         kept, here = [model for part in parts[:-1] for model in part], environments - 1
-        yield Reduced(number, 2 * PARTS - 1, here, test - 1)
-        yield RoundFinished(number)
+        yield Reduced(round=number, candidate=2 * PARTS - 1, environment=here, evidence_test=test - 1)
+        yield RoundFinished(round=number)
 
 
 def tried(round: int, candidate: int, environment: int, tests: range, width: float) -> Iterator[Event]:
     """All tests of a candidate, and its verdict: similar if there is but one."""
     similar = len(tests) == 1
     for run, test in enumerate(tests):
-        yield TestStarted(test, environment, run, run, "round", round, candidate)
+        yield TestStarted(test=test, environment=environment, run=run, seed=run, phase="round", round=round, candidate=candidate)
         yield ended(test, "similar" if similar else "other" if run % 2 else "pass", width)
-    yield CandidateJudged(round, candidate, "similar" if similar else "dissimilar", tuple(tests))
+    yield CandidateJudged(round=round, candidate=candidate, verdict="similar" if similar else "dissimilar", tests=tuple(tests))
 
 
 def ended(test: int, outcome: Outcome, width: float) -> TestFinished:
     return TestFinished(
-        test,
-        outcome,
+        test=test,
+        outcome=outcome,
         failure="" if outcome == "pass" else "stuck",
         distance=0.12 if outcome == "similar" else 2.34567891,
         end_pose=(width / 2, width / 2, 0.2, 1.0, 0.0, 0.0, 0.0),

@@ -30,7 +30,7 @@ def typed(state: RunState, kind: str, data: dict[str, Any]) -> list[Event]:
     def numbered(models: Environment) -> int:
         if models not in numbers:
             numbers[models] = len(state.environments) + len(new)
-            new.append(EnvironmentNamed(numbers[models], models))
+            new.append(EnvironmentNamed(environment=numbers[models], models=models))
         return numbers[models]
 
     full = _full(state, kind, dict(data), numbered)

@@ -47,8 +47,8 @@ def evil(tmp_path, home):
     database.close()
     with RunFile(run.path) as file:
         file.own()
-        file.append(Noted("speed", f"slow {ESCAPES}"))
-        file.append(EngineFailed(f"broke {ESCAPES}"))
+        file.append(Noted(about="speed", words=f"slow {ESCAPES}"))
+        file.append(EngineFailed(reason=f"broke {ESCAPES}"))
     (tmp_path / "a.ddenv.log").write_text(f"ddenv engine: died {ESCAPES}\nValueError: {ESCAPES}\n")
     return run.path
 

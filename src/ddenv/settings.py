@@ -30,7 +30,7 @@ MESH_READINGS: tuple[str, ...] = get_args(MeshReading)
 Shown = Literal["method", "basic", "more", "option", "scenario"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
     """A setting and all that is known about it.
 
@@ -122,7 +122,7 @@ def number_text(value: Value) -> str:
 
 def setting(default: Value, meaning: str, **more: Any) -> Any:
     """Declares a setting in a class of settings; the annotation beside it is its type."""
-    return Setting(default, meaning, **more)
+    return Setting(default=default, meaning=meaning, **more)
 
 
 class Reduction:
@@ -366,7 +366,7 @@ OPTIONS = tuple(each for each in SETTINGS.values() if each.option)
 CHANGEABLE = tuple(each.name for each in SETTINGS.values() if each.may_change)
 PRINTED: dict[str, Value] = {each.name: each.printed for each in SETTINGS.values() if each.printed is not None}
 # Not in a scenario, since it does not change the result.
-JOBS = Setting(None, "tests at the same time", least=1, most=1024, shown="basic", name="jobs", kind=int)
+JOBS = Setting(default=None, meaning="tests at the same time", least=1, most=1024, shown="basic", name="jobs", kind=int)
 
 
 def is_printed(reduction: Mapping[str, Any]) -> bool:

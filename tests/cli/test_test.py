@@ -37,7 +37,7 @@ def test_where_no_f_is_known_all_failures_count():
 
 
 def test_runs_in_another_simulator_are_compared_with_the_certificate():
-    here = Claim(None, "kept", 29, 29, 0.88, 1.0)
+    here = Claim(without=None, verdict="kept", shown=29, runs=29, low=0.88, high=1.0)
     many = [
         *runs(None, *["similar"] * 18, "other", "pass"),
         *runs("ball", *["pass"] * 8, "error"),
@@ -59,7 +59,7 @@ def test_runs_in_another_simulator_are_compared_with_the_certificate():
 def test_nothing_is_needed_elsewhere_where_f_hardly_shows_there(shown):
     """Runs that miss f without a model say nothing about it, where they miss f with it as well."""
     there = [*["similar"] * shown, *["pass"] * (20 - shown)]
-    here = Claim(None, "kept", 29, 29, 0.88, 1.0)
+    here = Claim(without=None, verdict="kept", shown=29, runs=29, low=0.88, high=1.0)
     what_is_left, ball = elsewhere([*runs(None, *there), *runs("ball", *there)], here, "MuJoCo")
     assert what_is_left["fails"] is False
     assert ball["fails"] is None and ball["said"].startswith("ball: not shown for MuJoCo")

@@ -61,21 +61,21 @@ def mjcf(monkeypatch):
 
 
 def link(name, *shapes, at=0.0, mass=None):
-    collisions = tuple(Collision(f"c{number}", shape, Pose(), mu) for number, (shape, mu) in enumerate(shapes))
+    collisions = tuple(Collision(name=f"c{number}", shape=shape, pose=Pose(), mu=mu) for number, (shape, mu) in enumerate(shapes))
     inertia = None if mass is None else Inertia(mass, Pose(), (1.0, 1.0, 1.0))
-    return Link(name, Pose((at, 0.0, 0.0)), inertia, collisions, ())
+    return Link(name=name, pose=Pose((at, 0.0, 0.0)), inertia=inertia, collisions=collisions, visuals=())
 
 
 def model(name, *links, static=False, joints=()):
-    return Model(name, Pose(), static, links, joints, (), 1)
+    return Model(name=name, pose=Pose(), static=static, links=links, joints=joints, spans=(), line=1)
 
 
 def joint(kind, parent, child, **more):
-    return Joint(f"{parent}-{child}", kind, parent, child, Pose((1, 0, 0)), (0, 0, 1), -1, 1, 9, 9, 0.5, **more)
+    return Joint(name=f"{parent}-{child}", kind=kind, parent=parent, child=child, pose=Pose((1, 0, 0)), axis=(0, 0, 1), lower=-1, upper=1, effort=9, velocity=9, damping=0.5, **more)
 
 
 def written(mjcf, *models):
-    world = World(ROOT, "w", b"", (0.0, 0.0, -9.8), models)
+    world = World(path=ROOT, name="w", text=b"", gravity=(0.0, 0.0, -9.8), models=models)
     return ElementTree.fromstring(mjcf.mjcf(world, ROBOT, Pose((0, 0, 1)), find_drive(ROBOT), 30.0, 0.002))
 
 

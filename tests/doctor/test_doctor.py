@@ -67,7 +67,7 @@ def test_what_a_killed_engine_left_is_part_of_the_run_and_stays_where_it_is(tmp_
     copy.mkdir()
     with RunFile(path) as file:
         file.own()
-        file.append(EngineStarted(1, 1, "1", "x"))
+        file.append(EngineStarted(pid=1, jobs=1, version="1", simulator="x"))
         events = len(file.events())
         for each in (path, path.with_name(f"{path.name}-wal")):
             shutil.copy(each, copy)
@@ -139,7 +139,7 @@ def test_a_log_of_another_run_does_not_hide_what_is_whole(run):
 def test_a_run_at_work_is_checked_and_copied_whole(run):
     with RunFile(run) as file, engine_lock(run):
         file.own()
-        file.append(AcceptModeChanged("ask"))
+        file.append(AcceptModeChanged(mode="ask"))
         found = {finding.what: finding for finding in run_health(run)}
         assert found["engine"].says == "running" and found["log"].state == "ok"
         repair(run, run.parent / "copy.ddenv")

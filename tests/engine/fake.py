@@ -53,7 +53,7 @@ def result(outcome: str, seed: int, x: float, cut: bool = False) -> RunResult:
     trajectory = np.zeros((3, 8))
     trajectory[:, 0], trajectory[:, 1], trajectory[:, 4] = (0, 1, 2), (0, x / 2, x), 1
     failure = "stuck" if outcome == "failed" else ""
-    return RunResult(outcome, failure, trajectory, {}, 2.0, 0.01, seed, SENSED, TOUCHED, cut)
+    return RunResult(outcome=outcome, failure=failure, trajectory=trajectory, motions={}, simulated_seconds=2.0, wall_seconds=0.01, seed=seed, first_sensed=SENSED, first_touched=TOUCHED, cut=cut)
 
 
 class FakePool:

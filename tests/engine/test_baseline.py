@@ -36,7 +36,7 @@ def ran(*outcomes, spec: FailureSpec = SPEC, wanted: int = 1, chose: int = 0):
             (one, "broken" if one == "error" else "", None) if isinstance(one, str) else ("failed", *one)
         )
         end = None if rows is None else tuple(rows[-1, 1:])
-        tests.append(Ran(run + 1, 0, "baseline", None, None, run, run, outcome, kind, end_pose=end))
+        tests.append(Ran(id=run + 1, environment=0, phase="baseline", round=None, candidate=None, run=run, seed=run, outcome=outcome, failure=kind, end_pose=end))
         if rows is not None:
             ways[run + 1] = rows
     return fix_failure(tests, ways, spec, 3, wanted, chose, usual=len(tests))

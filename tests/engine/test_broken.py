@@ -56,7 +56,7 @@ def test_a_worker_that_is_killed_takes_its_command_along_and_the_next_one_works(
     once = f"import os, sys\nif os.path.exists('again'):\n    print('0,0,0,0,0,0,0,1')\n    sys.exit()\n{FAMILY}"
     pool = own_pool(tmp_path, once + SLEEP)
     try:
-        pool.submit(1, Run(EVERYTHING, 0))
+        pool.submit(1, Run(keep=EVERYTHING, seed=0))
         wait_until(lambda: pool.finished(0.0) or pool.live())
         (tmp_path / "again").touch()
         for pid in workers(pool):
@@ -64,7 +64,7 @@ def test_a_worker_that_is_killed_takes_its_command_along_and_the_next_one_works(
         test, broken = result(pool)
         assert (test, broken.outcome) == (1, "error")
         wait_until(lambda: not processes_with(token, COMMAND))
-        pool.submit(2, Run(EVERYTHING, 0))
+        pool.submit(2, Run(keep=EVERYTHING, seed=0))
         assert result(pool)[1].outcome == "pass"
     finally:
         pool.close()
@@ -74,7 +74,7 @@ def test_a_command_that_hangs_is_told_with_its_reason_and_its_worker_lives_on(tm
     pool = own_pool(tmp_path, FAMILY + SLEEP, wall_timeout=0.5)
     try:
         for test in (1, 2):
-            pool.submit(test, Run(EVERYTHING, 0))
+            pool.submit(test, Run(keep=EVERYTHING, seed=0))
             late = result(pool)[1]
             assert (late.outcome, late.failure) == ("error", "took longer than 0.5 s of wall clock")
             before = workers(pool)
@@ -92,7 +92,7 @@ def test_a_command_that_went_missing_is_told(tmp_path):
         scenario.model_copy(update={"oracle": scenario.oracle.model_copy(update={"command": "./gone"})}), *parts, 1
     )
     try:
-        pool.submit(1, Run(EVERYTHING, 0))
+        pool.submit(1, Run(keep=EVERYTHING, seed=0))
         with pytest.raises(UserError, match=r"oracle.command: .*gone"):
             result(pool)
     finally:

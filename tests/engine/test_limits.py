@@ -55,15 +55,15 @@ HOW = {
 
 @pytest.mark.parametrize("how", slow(pytest.mark.programs, HOW, but=["segfaults"]))
 def test_whatever_a_simulator_does_is_an_error_of_its_test_and_the_next_one_works(hostile, how):
-    hostile.submit(1, Run(frozenset({how}), 0))
+    hostile.submit(1, Run(keep=frozenset({how}), seed=0))
     assert result(hostile) == (1, Broken("error", HOW[how]))
-    hostile.submit(9, Run(frozenset({"ends"}), 0))
+    hostile.submit(9, Run(keep=frozenset({"ends"}), seed=0))
     assert result(hostile)[1].outcome == "pass"
 
 
 @pytest.mark.programs
 def test_garbage_on_stdout_does_no_harm_and_does_not_fill_the_log(hostile, capfd):
-    hostile.submit(1, Run(frozenset({"babbles"}), 7))
+    hostile.submit(1, Run(keep=frozenset({"babbles"}), seed=7))
     test, made = result(hostile)
     assert (test, made.outcome, made.seed) == (1, "pass", 7)
     said = capfd.readouterr()
@@ -76,7 +76,7 @@ def test_garbage_on_stdout_does_no_harm_and_does_not_fill_the_log(hostile, capfd
 def test_workers_that_die_before_they_run_a_test_end_the_engine_with_the_reason():
     pool = Pool(*parts(), 1, dies_at_once)
     try:
-        pool.submit(1, Run(EVERYTHING, 0))
+        pool.submit(1, Run(keep=EVERYTHING, seed=0))
         with pytest.raises(UserError, match=r"die before they run a test: .*SIGKILL, perhaps out of memory"):
             result(pool)
     finally:
@@ -152,7 +152,7 @@ def test_a_number_of_the_users_holds_for_all_tests(tmp_path):
 
 
 def pace(simulated, real, slot=0):
-    return Live(slot, 1, simulated, (0.0,) * 7), real
+    return Live(slot=slot, test=1, time=simulated, pose=(0.0,) * 7), real
 
 
 def test_a_slow_world_is_told_once_while_its_first_run_goes_on(tmp_path):

@@ -136,7 +136,7 @@ def test_a_stop_keeps_all_and_the_run_is_as_it_was(path):
         work(path, pool)
     with RunFile(path) as file:
         file.own()
-        Journal(file).record(EngineStopped("stopped by the user"))
+        Journal(file).record(EngineStopped(reason="stopped by the user"))
     state = state_of(path)
     assert (state.status, state.reason, state.minimal) == (before.status, before.reason, before.minimal)
     assert len(state.margining.runs) >= 8
@@ -227,7 +227,7 @@ def test_what_is_wrong_is_said_in_one_line(path):
         work(path, broken)
     with RunFile(path) as file:
         file.own()
-        Journal(file).record(EngineFailed("25 runs in a row broke"))
+        Journal(file).record(EngineFailed(reason="25 runs in a row broke"))
     # The reduction is as it was, and what broke is no claim.
     state = state_of(path)
     assert (state.status, state.reason, state.margining) == (before.status, before.reason, None)
@@ -259,7 +259,7 @@ def test_a_run_with_another_value_has_the_bits_of_the_world_that_is_exported(tmp
 
 def simulated(pool, keep, changes):
     """The robot's trajectory with seed 1."""
-    pool.submit(1, Run(keep, 1, changes=changes))
+    pool.submit(1, Run(keep=keep, seed=1, changes=changes))
     while not (ended := pool.finished(1.0)):
         pass
     return ended[0][1].trajectory

@@ -129,7 +129,7 @@ def test_a_clock_that_jumps_is_told_and_its_time_does_not_count(tmp_path, monkey
     with RunFile(path) as file:
         file.own()
         journal = Journal(file)
-        journal.record(EngineStarted(1, 1, "1", "x"))
+        journal.record(EngineStarted(pid=1, jobs=1, version="1", simulator="x"))
         monkeypatch.setattr(time, "time", lambda: now[0] + now[1])
         monkeypatch.setattr(time, "monotonic", lambda: now[1])
         engine = Control(journal, threading.Event())

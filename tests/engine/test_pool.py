@@ -36,7 +36,7 @@ def test_models_that_moved_are_told_and_a_run_that_starts_again_has_all_of_its_t
                 progress(time_s, start, {"ball": ball, "post": start})
                 time.sleep(PERIOD)
 
-    answered(Run(EVERYTHING, 1, True, 60.0), Pushing(), told.append)
+    answered(Run(keep=EVERYTHING, seed=1, ends=True, limit=60.0), Pushing(), told.append)
     # It has its models where they started, again.
     assert [moment.models for moment in told] == [{}, {}, {"ball": later}, {}]
     assert [moment.time for moment in told] == [0.0, 1.0, 2.0, 0.0]
@@ -74,13 +74,13 @@ def test_an_idle_worker_that_dies_is_replaced_and_all_have_what_makes_drake_fast
 
 
 def _test_a_dying_worker(pool):
-    pool.submit(1, Run(EVERYTHING, 0))
+    pool.submit(1, Run(keep=EVERYTHING, seed=0))
     assert result(pool)[1].outcome == "failed"
     first = workers(pool)
     for pid in workers(pool):
         os.kill(pid, signal.SIGKILL)
     wait_until(lambda: pool.finished(0.0) or not set(first) & set(workers(pool)))
-    pool.submit(2, Run(EVERYTHING, 0))
+    pool.submit(2, Run(keep=EVERYTHING, seed=0))
     assert result(pool)[1].outcome == "failed"
     assert not set(first) & set(workers(pool))
     for pid in workers(pool):
@@ -92,12 +92,12 @@ def _test_a_dying_worker(pool):
 
 
 def test_a_worker_that_dies_in_a_test_makes_it_an_error_and_the_next_one_works(pool):
-    pool.submit(1, Run(EVERYTHING, 0))
+    pool.submit(1, Run(keep=EVERYTHING, seed=0))
     wait_until(lambda: pool.finished(0.0) or pool.live())
     os.kill(next(slot.worker.pid for slot in pool._slots if slot.job), signal.SIGKILL)
     died = "the simulator's process died (SIGKILL, perhaps out of memory)"
     assert result(pool) == (1, Broken("error", died))
-    pool.submit(2, Run(EVERYTHING, 0))
+    pool.submit(2, Run(keep=EVERYTHING, seed=0))
     test, after = result(pool)
     assert (test, after.outcome) == (2, "failed")
 
@@ -106,10 +106,10 @@ def test_a_worker_that_dies_in_a_test_makes_it_an_error_and_the_next_one_works(p
 @pytest.mark.parametrize("pool", [2], indirect=True)
 def test_an_exception_in_a_worker_is_an_error_of_its_test_and_another_worker_goes_on(pool):
     for test in (1, 2):
-        pool.submit(test, Run(EVERYTHING, 0))
+        pool.submit(test, Run(keep=EVERYTHING, seed=0))
     wait_until(lambda: not pool.busy or pool.finished(0.2))
     before = workers(pool)
-    pool.submit(3, Run(frozenset({"deck", "g\nhost"}), 0))
+    pool.submit(3, Run(keep=frozenset({"deck", "g\nhost"}), seed=0))
     ended = []
     wait_until(lambda: not pool.busy or ended.extend(pool.finished(0.2)))
     broken = dict(ended)[3]
@@ -117,7 +117,7 @@ def test_an_exception_in_a_worker_is_an_error_of_its_test_and_another_worker_goe
     # What it has left behind in the simulator is gone.
     wait_until(lambda: len(set(workers(pool)) - set(before)) == 1)
     for test in (4, 5):
-        pool.submit(test, Run(EVERYTHING, 0))
+        pool.submit(test, Run(keep=EVERYTHING, seed=0))
     after = []
     wait_until(lambda: not pool.busy or after.extend(pool.finished(0.2)))
     assert sorted((test, each.outcome) for test, each in after) == [(4, "failed"), (5, "failed")]
@@ -143,11 +143,11 @@ def test_a_test_that_takes_too_long_is_killed_and_the_next_one_works(tmp_path):
     waits = scenario.controller.model_copy(update={"use": "waits:Waits", "answer_within": 1e6})
     pool = Pool(scenario.model_copy(update={"controller": waits, "folder": tmp_path}), world, robot, 1)
     try:
-        pool.submit(1, Run(EVERYTHING, 0))
+        pool.submit(1, Run(keep=EVERYTHING, seed=0))
         test, late = result(pool)
         assert (test, late.outcome, late.failure) == (1, "timeout", "took longer than 0.5 s of wall clock")
         (tmp_path / "go").touch()
-        pool.submit(2, Run(EVERYTHING, 0, limit=1e6))
+        pool.submit(2, Run(keep=EVERYTHING, seed=0, limit=1e6))
         assert (result(pool)[1].outcome, pool.idle) == ("failed", 1)
     finally:
         pool.close()
@@ -190,7 +190,7 @@ def test_only_the_time_counts_in_which_the_robot_moves(monkeypatch):
     monkeypatch.setattr("ddenv.engine.pool.WorkerProcess", Silent)
     pool = Pool(*parts(wall_timeout=60), 1)
     clock = Clock(pool, monkeypatch)
-    pool.submit(1, Run(EVERYTHING, 0))
+    pool.submit(1, Run(keep=EVERYTHING, seed=0))
     assert clock.looks(600, every=0.5) == []
     pool._slots[0].go_on(Moment(clock.now, 0.0, (0.0,) * 7, {}))
     assert clock.looks(30, every=0.5) == []
@@ -201,14 +201,14 @@ def test_only_the_time_counts_in_which_the_robot_moves(monkeypatch):
     assert Silent.killed == 1
     assert pool.idle == 1
     # Nothing of its time counts for the next one; and what never begins ends, too.
-    pool.submit(2, Run(EVERYTHING, 0))
+    pool.submit(2, Run(keep=EVERYTHING, seed=0))
     assert clock.looks(PREPARATION - 1) == []
     ended = clock.looks(2)
     assert ended == [(2, Broken("timeout", "took longer than 3600 s of wall clock to prepare"))]
 
 
 def test_progress_is_seen_while_a_test_runs(pool):
-    pool.submit(7, Run(EVERYTHING, 0))
+    pool.submit(7, Run(keep=EVERYTHING, seed=0))
     seen = []
     while not (ended := pool.finished(0.005)):
         seen += pool.live()
@@ -235,7 +235,7 @@ def test_a_worker_finds_what_rests_on_what(tmp_path):
         wait_until(lambda: known.append(found()) or known[-1] is not None, lambda: "it was not found")
         assert known[-1].supports == [("ball", "deck")]
         # The worker is free again.
-        pool.submit(1, Run(EVERYTHING, 0))
+        pool.submit(1, Run(keep=EVERYTHING, seed=0))
         assert result(pool)[1].outcome == "failed"
     finally:
         pool.close()
@@ -247,7 +247,7 @@ def test_a_world_that_cannot_be_simulated_is_told():
     legless = robot.__class__(robot.name, robot.pose, robot.static, robot.links, (), robot.spans, robot.line)
     pool = Pool(scenario, world, legless, 1)
     try:
-        pool.submit(1, Run(EVERYTHING, 0))
+        pool.submit(1, Run(keep=EVERYTHING, seed=0))
         with pytest.raises(UserError, match="wheels on both sides"):
             result(pool)
     finally:

@@ -51,7 +51,7 @@ def test_a_worker_keeps_its_object_until_a_test_breaks_and_leaves_no_file(pool, 
     made = {}
     for test, seed in enumerate((0, 4, 1, 5, 2, 6, 3, 7)):
         # That of a test which hangs is short.
-        pool.submit(test, Run(LEFT, seed, limit=1.0 if seed == 2 else None))
+        pool.submit(test, Run(keep=LEFT, seed=seed, limit=1.0 if seed == 2 else None))
         made[seed] = result(pool)[1]
     broken = {seed: one for seed, one in made.items() if isinstance(one, Broken)}
     assert broken == {

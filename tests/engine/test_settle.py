@@ -51,7 +51,7 @@ def pool(oracle, jobs=2, seed=0, supports=PAIRS):
 def test_what_is_wrong_with_the_start_is_told_once_each_before_the_first_test(tmp_path, world):
     path = new_run(tmp_path, world=world, budget=1)
     made = pool(needs("wall"))
-    made.settled = Settled(3.0, {"ball": (Pose((4.0, 4.0, 1.3)),)}, restless=("ball",))
+    made.settled = Settled(seconds=3.0, places={"ball": (Pose((4.0, 4.0, 1.3)),)}, restless=("ball",))
     # The engine is killed after the first line.
     with pytest.raises(Killed):
         drive(path, made, prepare=lambda file: kill_after(file, 1))

@@ -46,8 +46,8 @@ def read_back(rows):
 
 
 def model(name, shape):
-    link = Link("link", Pose((1.0, 2.0, 0.0)), None, (Collision("c", shape, Pose((1.0, 2.0, 0.5)), 1.0),), ())
-    return Model(name, Pose(), True, (link,), (), (), 1)
+    link = Link(name="link", pose=Pose((1.0, 2.0, 0.0)), inertia=None, collisions=(Collision(name="c", shape=shape, pose=Pose((1.0, 2.0, 0.5)), mu=1.0),), visuals=())
+    return Model(name=name, pose=Pose(), static=True, links=(link,), joints=(), spans=(), line=1)
 
 
 @pytest.fixture

@@ -144,7 +144,7 @@ def test_the_whole_world_keeps_its_rate_and_is_run_nevertheless(terms):
 
 
 def test_where_f_always_shows_a_few_runs_are_enough():
-    terms = Terms(2 / 3, 0.8, FIRST, 10)
+    terms = Terms(certify_rate=2 / 3, keep_rate=0.8, error=FIRST, at_least=10)
     kept = settle(keeps(LEFT, WHOLE, terms), lambda *_: True)
     assert kept.verdict == "kept"
     # The whole world need not run: it cannot show f more often.
@@ -160,14 +160,14 @@ def test_where_f_always_shows_a_few_runs_are_enough():
 
 
 def test_the_whole_world_runs_only_where_what_is_left_missed_f_while_that_shows_f_often():
-    claim = settle(keeps(LEFT, WHOLE, Terms(2 / 3, 0.3, FIRST)), shown := outcomes((0.9, 0.8, 0.0), 5))
+    claim = settle(keeps(LEFT, WHOLE, Terms(certify_rate=2 / 3, keep_rate=0.3, error=FIRST)), shown := outcomes((0.9, 0.8, 0.0), 5))
     left, whole = ({run for one, run in claim.rests_on if one == environment} for environment in (LEFT, WHOLE))
     assert sum(shown(LEFT, run) for run in left) > ALONE_SHARE * len(left) > 2 * ALONE_FIRST
     assert whole == {run for run in left if not shown(LEFT, run)}
 
 
 def test_the_whole_world_runs_with_all_seeds_where_what_is_left_shows_f_less_often():
-    claim = settle(keeps(LEFT, WHOLE, Terms(2 / 3, 0.3, FIRST)), shown := outcomes((0.5, 0.5, 0.0), 3))
+    claim = settle(keeps(LEFT, WHOLE, Terms(certify_rate=2 / 3, keep_rate=0.3, error=FIRST)), shown := outcomes((0.5, 0.5, 0.0), 3))
     left, whole = ([run for one, run in claim.rests_on if one == environment] for environment in (LEFT, WHOLE))
     assert sum(shown(LEFT, run) for run in left) < ALONE_SHARE * len(left)
     assert sorted(left) == sorted(whole)
@@ -175,7 +175,7 @@ def test_the_whole_world_runs_with_all_seeds_where_what_is_left_shows_f_less_oft
 
 def test_without_a_model_that_helps_f_is_shown_to_be_rarer():
     """As in the paper's friction world: 204 of 240 without one wall, 240 of 240 with it."""
-    terms = Terms(2 / 3, 0.8, FIRST, 10)
+    terms = Terms(certify_rate=2 / 3, keep_rate=0.8, error=FIRST, at_least=10)
     claims = [settle(falls(REST, LEFT, terms.error), outcomes((1.0, 1.0, 0.85), salt)) for salt in range(60)]
     helps = [claim for claim in claims if claim.verdict in HELPING]
     assert len(helps) >= 45
@@ -199,7 +199,7 @@ def share_claimed(verdict, procedure, rates, simulated, together=0.0, breaks=0.0
 @pytest.mark.parametrize("together", [0.0, 0.6])
 @pytest.mark.parametrize("whole", [0.5, 0.95])
 def test_what_is_true_is_mostly_shown(whole, together):
-    terms = Terms(2 / 3, 0.8, FIRST, 10)
+    terms = Terms(certify_rate=2 / 3, keep_rate=0.8, error=FIRST, at_least=10)
     assert share_claimed("kept", lambda: keeps(LEFT, WHOLE, terms), (whole, whole, 0.0), 40, together) >= 0.85
     assert share_claimed("needed", lambda: falls(REST, LEFT, terms.error), (whole, whole, 0.0), 40, together) >= 0.95
 
@@ -207,5 +207,5 @@ def test_what_is_true_is_mostly_shown(whole, together):
 @pytest.mark.parametrize("together", [0.0, 0.6])
 @pytest.mark.parametrize("whole", [0.5, 0.9])
 def test_what_kept_less_than_the_search_aims_at_is_lost(whole, together):
-    terms = Terms(2 / 3, 0.8, FIRST, 10)
+    terms = Terms(certify_rate=2 / 3, keep_rate=0.8, error=FIRST, at_least=10)
     assert share_claimed("lost", lambda: keeps(LEFT, WHOLE, terms), (whole, 0.3 * whole, 0.0), 40, together) >= 0.9

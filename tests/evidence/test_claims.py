@@ -50,7 +50,7 @@ def test_screen_report_json_and_console_say_that_a_pinned_model_was_never_left_o
     found = state.certificate
     means = promise(state, found)
     assert f"any one model that is not pinned ({PINNED})" in means
-    assert means[1:] in " ".join(explain(Snapshot(state, (), "absent")).sentences)
+    assert means[1:] in " ".join(explain(Snapshot(state=state, live=(), engine="absent")).sentences)
     assert means in " ".join(summary_lines(state, pinned.path))
     report = markdown(content(read_run(pinned.path)), "report")
     told = summary(state, pinned.path)

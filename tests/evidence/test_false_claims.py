@@ -45,7 +45,7 @@ SIMULATED = int(os.environ.get("DDENV_CLAIMS", "100"))
 # Of what takes longer: whole reductions, forecasts, and margins.
 LONGER = int(os.environ.get("DDENV_CLAIMS", "30"))
 WHOLE, LEFT, REST = Environment.whole(6), Environment.whole(2), Environment.whole(1)
-TERMS = Terms(2 / 3, 0.8, error_of(1), 10)
+TERMS = Terms(certify_rate=2 / 3, keep_rate=0.8, error=error_of(1), at_least=10)
 
 
 @dataclass(frozen=True)
@@ -350,7 +350,7 @@ def test_models_that_are_called_needed_beside_others_that_only_help_are_rarely_n
 
 @pytest.mark.parametrize(("rate", "without"), [(0.0, 0.0), (0.15, 0.15), (0.9, 0.73), (1.0, 0.805)])
 def test_a_model_is_rarely_needed_in_another_simulator_where_it_is_not(rate, without, check):
-    here, said = Claim(None, "kept", 29, 29, 0.88, 1.0), 0
+    here, said = Claim(without=None, verdict="kept", shown=29, runs=29, low=0.88, high=1.0), 0
     for salt in range(SIMULATED):
         draw = random.Random(salt)
         results = [
@@ -374,7 +374,7 @@ def test_what_still_fails_rarely_fails_at_half_the_rate_that_is_said(share, chec
 @pytest.mark.parametrize("rate", [1.0, 0.7])
 def test_the_goal_is_rarely_said_to_be_reached_to_the_end_where_it_is_not(rate, check):
     """In a window of values alone, as wide as half of the range: beyond it f shows again."""
-    asked, false = NumberAsked("x", 0.5, 0.0, 1.0, 1.0, 0.01), 0
+    asked, false = NumberAsked(name="x", now=0.5, low=0.0, high=1.0, scale=1.0, resolution=0.01), 0
     rule = Rule(rate, error_each(rate, MOST_OF_NUMBER))
     for salt in range(LONGER):
         draw, outcomes = random.Random(salt), {}
@@ -401,7 +401,7 @@ VALUES = {
 @pytest.mark.parametrize(("share", "goal"), VALUES.values(), ids=VALUES)
 def test_what_margins_say_of_the_values_of_a_number_is_rarely_false(share, goal, rate, check):
     """That f shows up to a value, that it is gone at one, and that the robot reaches its goal at one: all of a call together."""
-    asked, false = NumberAsked("x", 0.5, 0.0, 1.0, 1.0, 0.01), 0
+    asked, false = NumberAsked(name="x", now=0.5, low=0.0, high=1.0, scale=1.0, resolution=0.01), 0
     rule = Rule(rate, error_each(rate, MOST_OF_NUMBER))
     wrong = {"f"} if share <= GONE else {"other", "goal"}
     if goal <= MISSED:

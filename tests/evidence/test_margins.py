@@ -12,8 +12,8 @@ from ddenv.evidence.margins import MOST_OF_NUMBER, Known, Rule, margin_of, steps
 from ddenv.runfile.events import NumberAsked
 from tests.tiers import examples, slow
 
-PLACE = NumberAsked("barrel.y", 0.5, -2.5, 3.5, 3.0, 0.01, "m")
-FRICTION = NumberAsked("patch.friction", 0.0015, 0.0, 1.0, 1.0, 0.002)
+PLACE = NumberAsked(name="barrel.y", now=0.5, low=-2.5, high=3.5, scale=3.0, resolution=0.01, unit="m")
+FRICTION = NumberAsked(name="patch.friction", now=0.0015, low=0.0, high=1.0, scale=1.0, resolution=0.002)
 # The error of one verdict where all of some fifteen values of a number are right in 95 of 100.
 ERROR = 0.05 / 15
 

@@ -60,11 +60,11 @@ def test_a_slice_is_told_with_the_chance_that_a_fresh_run_meets_what_went(moment
 
 def test_the_workbench_teaches_what_is_implied(moments):
     _, _, sliced = first(moments, "sliced")
-    said = " ".join(explain(Snapshot(sliced, (), "alive")).sentences)
+    said = " ".join(explain(Snapshot(state=sliced, live=(), engine="alive")).sentences)
     assert "Removing models that cannot have affected a run changes no bit of it" in said
     assert "u takes it back" in said
     recorded, _, implied = first(moments, "implied")
-    said = " ".join(explain(Snapshot(implied, (), "alive")).sentences)
+    said = " ".join(explain(Snapshot(state=implied, live=(), engine="alive")).sentences)
     assert (
         f"Test {recorded.event.test} is implied by test {recorded.event.by}: no model it lacks affected that run."
         in said
@@ -76,7 +76,7 @@ def test_the_row_of_a_candidate_names_the_run_that_implies_its_test(moments):
     judged = next(
         after for each, _, after in moments if each.kind == "candidate_judged" and event.test in each.event.tests
     )
-    shown = Snapshot(judged, (), "alive")
+    shown = Snapshot(state=judged, live=(), engine="alive")
     listing = listed(shown)
     rows = [words(shown, listing, row) for row in range(len(listing))]
     by = rf"tests? (\d+, )*{event.by}\b"

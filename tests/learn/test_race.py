@@ -108,7 +108,7 @@ def test_the_winner_and_the_reason_come_from_the_tests():
         said := result([plays["ddmin"], recorded])
     )
     assert result([plays["ddmin"], plays["ddmin"]]) == ("All needed 9 tests.",)
-    half = Play("half", recorded.begins, recorded.turns[:3], ended=False)
+    half = Play(name="half", begins=recorded.begins, turns=recorded.turns[:3], ended=False)
     assert result([half, recorded])[0].startswith("half did not finish")
     assert result([half, recorded])[-1] == "So there is no winner."
 

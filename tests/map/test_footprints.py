@@ -27,8 +27,8 @@ angle = st.floats(-3, 3)
 
 
 def print_of(shape: Shape, pose: Pose = Pose(), corners: int = ROUND):  # noqa: B008
-    collisions = (Collision("c", shape, pose, 1.0),)
-    return footprint(Model("m", Pose((4, 5, 6)), True, (Link("l", Pose(), None, collisions, ()),), (), (), 1), corners)
+    collisions = (Collision(name="c", shape=shape, pose=pose, mu=1.0),)
+    return footprint(Model(name="m", pose=Pose((4, 5, 6)), static=True, links=(Link(name="l", pose=Pose(), inertia=None, collisions=collisions, visuals=()),), joints=(), spans=(), line=1), corners)
 
 
 @given(st.sampled_from(SHAPES), st.builds(Pose.from_rpy, angle, angle, angle, angle, angle, angle))
@@ -64,8 +64,8 @@ def test_a_model_without_shapes_is_a_point():
 
 def test_a_model_that_moved_and_tipped_over_covers_what_it_lies_on():
     upright = Pose((1.0, 0.0, 1.0))
-    link = Link("link", upright, None, (Collision("post", Box((0.2, 0.2, 2.0)), upright, 1.0),), ())
-    model = Model("post", upright, False, (link,), (), (), 1)
+    link = Link(name="link", pose=upright, inertia=None, collisions=(Collision(name="post", shape=Box((0.2, 0.2, 2.0)), pose=upright, mu=1.0),), visuals=())
+    model = Model(name="post", pose=upright, static=False, links=(link,), joints=(), spans=(), line=1)
     there = Pose.from_rpy(4.0, 0.0, 0.1, 0.0, math.pi / 2, 0.0)
     moved = footprint(model, moved=there @ model.links[0].pose.inverse())
     assert (*moved.low, *moved.high) == pytest.approx((3.0, -0.1, 5.0, 0.1), abs=1e-6)

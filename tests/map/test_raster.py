@@ -19,7 +19,7 @@ from ddenv.world.pose import heading
 from tests.map.worlds import GROUND, box, world_of
 from tests.tiers import examples
 
-VIEW = View(0.0, 0.0, 0.5, 20, 8)
+VIEW = View(x=0.0, y=0.0, scale=0.5, columns=20, rows=8)
 
 
 def prints_of(*models: str):
@@ -78,7 +78,7 @@ def test_a_fit_clips_a_huge_model_and_is_ten_metres_for_nothing():
 
 
 def test_zooming_keeps_the_centre_and_has_an_end():
-    assert VIEW.zoomed(2) == View(0, 0, 0.25, 20, 8)
+    assert VIEW.zoomed(2) == View(x=0, y=0, scale=0.25, columns=20, rows=8)
     assert VIEW.zoomed(1e9).scale > 0
 
 
@@ -90,7 +90,7 @@ def test_arrows_point_where_the_robot_does(degrees, sign):
     assert arrow(heading((math.cos(half), 0, 0, math.sin(half)))) == sign
 
 
-SMALL = View(0.3, -0.2, 0.5, 12, 6)
+SMALL = View(x=0.3, y=-0.2, scale=0.5, columns=12, rows=6)
 coordinates = st.floats(-6, 6).map(lambda value: round(value, 3))
 clouds = st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=7)
 models = st.lists(st.lists(clouds, max_size=2), max_size=6)
@@ -232,7 +232,7 @@ def wall(length: float, width: float, yaw: float, x: float = 0.0, y: float = 0.0
     y=st.floats(-1, 1),
 )
 def test_a_thin_wall_is_one_line_from_end_to_end(length, part, yaw, x, y):
-    view = View(0, 0, 0.5, 24, 12)
+    view = View(x=0, y=0, scale=0.5, columns=24, rows=12)
     grid = owners(masks([wall(length, part * view.scale, yaw, x, y)], view), view) != EMPTY
     for away in np.arange(-length / 2 + 0.3, length / 2 - 0.3, 0.2):
         column, row = view.pixels(np.array([(x + away * math.cos(yaw), y + away * math.sin(yaw))]))[0]
@@ -244,7 +244,7 @@ def test_a_thin_wall_is_one_line_from_end_to_end(length, part, yaw, x, y):
 
 
 def test_far_and_endless_walls_are_cut_at_the_view():
-    view = View(0, 0, 0.5, 24, 12)
+    view = View(x=0, y=0, scale=0.5, columns=24, rows=12)
     for length in (1e4, 1e6):
         grid = owners(masks([wall(length, 0.01, 0.3)], view), view)
         assert (grid != EMPTY).sum() in range(20, 60)
@@ -252,12 +252,12 @@ def test_far_and_endless_walls_are_cut_at_the_view():
 
 @given(gap=st.floats(0.05, 0.5), offset=st.floats(-1, 1))
 def test_a_gap_between_platforms_is_seen_wherever_the_pixels_fall(gap, offset):
-    view = View(offset, 0, 0.5, 24, 6)
+    view = View(x=offset, y=0, scale=0.5, columns=24, rows=6)
     sides = [wall(6, 4, 0, x=sign * (3 + gap / 2)) for sign in (-1, 1)]
     prints = [Footprint(f"side{number}", each.polygons, each.low, each.high) for number, each in enumerate(sides)]
     names = frozenset(each.name for each in prints)
     palette = mixed(*DARK)
-    for who in (Kept(names, names), Kept(frozenset({"other"}), frozenset())):
+    for who in (Kept(elements=names, environment=names), Kept(elements=frozenset({"other"}), environment=frozenset())):
         canvas = Canvas(view.rows, view.columns, palette.back)
         fill(canvas, owners(masks(prints, view), view), looks(prints, who, palette))
         row = [(chr(char), int(back)) for char, back in zip(canvas.chars[3], canvas.back[3], strict=True)]

@@ -157,9 +157,9 @@ class Driver:
         groups = Stacks.of(stack for label in labels if not (stack := self.world.stack(label)) <= pinned)
         free = {model: stack for model, stack in groups.by_first.items() if stack <= self.now.chain[-1]}
         rate = self.rate() if self.world.keeps_rate else 0.0
-        rule = Acceptance(1 + self.world.iterations, rate, 0.8, len(self.now.lost))
+        rule = Acceptance(most_misses=1 + self.world.iterations, rate=rate, keep_rate=0.8, steps_back=len(self.now.lost))
         n_partitions = self.now.n_partitions.get(self.now.chain[-1])
-        leg = Leg(self.now.round + 1, self.world.whole, self.now.chain, pinned, free, rule, n_partitions, tuple(again))
+        leg = Leg(first_round=self.now.round + 1, whole=self.world.whole, chain=self.now.chain, pinned=pinned, free=free, rule=rule, n_partitions=n_partitions, again=tuple(again))
         self.legs.append((leg, deepcopy(self.now), len(self.facts)))
         return leg
 
@@ -247,7 +247,7 @@ class Driver:
     def certificate_due(self):
         self._step("certificate_due")
         self.now.certificates += 1
-        terms = Terms(2 / 3, 0.8, error_of(self.now.certificates), self.world.baseline_runs)
+        terms = Terms(certify_rate=2 / 3, keep_rate=0.8, error=error_of(self.now.certificates), at_least=self.world.baseline_runs)
         return Certificate(FIRST_FRESH + EACH_CERTIFICATE * self.now.certificates, terms)
 
     def certified(self, made):

@@ -109,7 +109,7 @@ def isolated(world, passing, rates=(1.0, 0.0), checks=(), **options):
 
     driver.outcome = reached
     stacks = Stacks.of(world.stack(label) for label in dict.fromkeys(world.labels))
-    asked = Asked(world.whole, stacks.representatives[::-1], stacks, 1, Passing.of(0, 10), 0.8, 5, 10_000, 1_000)
+    asked = Asked(whole=world.whole, suspects=stacks.representatives[::-1], stacks=stacks, size=1, rule=Passing.of(0, 10), keep_rate=0.8, at_least=5, first_run=10_000, block=1_000)
     return driver, driver.drive(isolation(driver, asked, checks)), stacks
 
 

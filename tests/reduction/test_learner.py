@@ -61,7 +61,7 @@ def test_of_nested_groups_the_smallest_speak():
 
 def test_with_no_test_yet_the_near_ones_are_likely():
     positions = {name: (float(x), 0.0, 0.0) for name, x in zip("abcde", (8, 1, 3, 20, 5), strict=True)}
-    known = Evidence(tuple("abcde"), positions, np.array([[0.0, 9, 0, 0, 0], [1, 0, 0, 0, 0]]), (0.0, 0.0, 0.0))
+    known = Evidence(elements=tuple("abcde"), positions=positions, trajectory=np.array([[0.0, 9, 0, 0, 0], [1, 0, 0, 0, 0]]), failure_position=(0.0, 0.0, 0.0))
     chances = Learner().chances(known.elements, known)
     assert "".join(known.elements[index] for index in np.argsort(-chances)) == "bcead"
     assert np.array_equal(chances, spatial_prior(known.elements, known))
@@ -70,7 +70,7 @@ def test_with_no_test_yet_the_near_ones_are_likely():
 def test_a_large_model_is_near_where_its_box_may_be():
     positions = {"hill": (6.0, 0.0, 0.0), "stone": (4.0, 0.0, 0.0)}
     known = Evidence(
-        ("hill", "stone"), positions, None, (0.0, 0.0, 0.0), traits={"hill": Traits(10), "stone": Traits(1)}
+        elements=("hill", "stone"), positions=positions, trajectory=None, failure_position=(0.0, 0.0, 0.0), traits={"hill": Traits(10), "stone": Traits(1)}
     )
     assert spatial_prior(("hill", "stone"), known)[0] > spatial_prior(("hill", "stone"), known)[1]
 
@@ -92,7 +92,7 @@ def test_it_learns_what_needed_models_are_like():
     for made in range(1, len(trials) + 1):
         gone = {next(iter(set(elements) - trial.models)) for trial in trials[:made] if trial.similar}
         there = tuple(name for name in elements if name not in gone)
-        known = Evidence(elements, positions, None, (0.0, 0.0, 0.0), traits=traits, trials=trials[:made])
+        known = Evidence(elements=elements, positions=positions, trajectory=None, failure_position=(0.0, 0.0, 0.0), traits=traits, trials=trials[:made])
         chances = learner.chances(there, known)
     assert there == left
     new = [index for index, name in enumerate(left) if name not in elements[:20]]

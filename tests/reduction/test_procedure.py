@@ -215,7 +215,7 @@ def certified_alone(world, vetoed=()):
     driver.algorithm = lambda leg: nothing(leg.chain[-1], None)
     driver.vetoed = {world.whole - Environment.of([model]) for model in vetoed}
     free = {model: Environment.of([model]) for model in world.whole}
-    leg = Leg(1, world.whole, (world.whole,), Environment(), free, Acceptance(1))
+    leg = Leg(first_round=1, whole=world.whole, chain=(world.whole,), pinned=Environment(), free=free, rule=Acceptance(most_misses=1))
     driver.drive(begun(driver, leg), most=2000)
     return [fact[1] for fact in driver.facts if fact[0] == "left_out"]
 
@@ -232,7 +232,7 @@ def test_a_candidate_that_the_user_wants_after_all_is_looked_at_again():
     candidates = [Environment.of(models) for models in ([0, 1], [1], [2], [0])]
     driver = Driver(world)
     driver.vetoed = {candidates[0]}
-    judging = judge(driver, candidates, Acceptance(2), "hand")
+    judging = judge(driver, candidates, Acceptance(most_misses=2), "hand")
     driver.drive(judging, most=3)
     assert driver.facts == [("judged", 1, candidates[1], "dissimilar", 2)]
     driver.vetoed, driver.refusals = set(), 1
@@ -240,4 +240,4 @@ def test_a_candidate_that_the_user_wants_after_all_is_looked_at_again():
     assert driver.facts[-1] == ("judged", 0, candidates[0], "similar", 1)
     # One that is refused after it was found similar is passed over.
     driver.vetoed = set(candidates[:1])
-    assert driver.drive(judge(driver, candidates, Acceptance(2), "hand")) == 3
+    assert driver.drive(judge(driver, candidates, Acceptance(most_misses=2), "hand")) == 3

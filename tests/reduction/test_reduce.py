@@ -448,7 +448,7 @@ def test_the_guides_algorithm_works_as_printed():
     searching = found["farthest_half"](tuple(range(8)), make_guide("model2model", "failure-proximal", lambda: known))
     assert [one.models for one in next(searching).candidates] == [Environment.of(range(4))]
     assert [
-        one.models for one in searching.send(Candidate("", 0, (), Environment.of(range(4)), NOTHING)).candidates
+        one.models for one in searching.send(Candidate(kind="", partition=0, part=(), models=Environment.of(range(4)), lacks=NOTHING)).candidates
     ] == [Environment.of(range(2))]
     with pytest.raises(StopIteration) as end:
         searching.send(None)

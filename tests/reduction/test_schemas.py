@@ -27,7 +27,7 @@ STILL = np.array([[0.0, 0, 0, 0, 0]])
 
 
 def known(positions, trajectory):
-    return Evidence(tuple(positions), positions, np.array(trajectory, dtype=float), tuple(trajectory[-1][1:4]))
+    return Evidence(elements=tuple(positions), positions=positions, trajectory=np.array(trajectory, dtype=float), failure_position=tuple(trajectory[-1][1:4]))
 
 
 def test_model2model_finds_clusters_in_space():
@@ -115,7 +115,7 @@ def test_five_thousand_models_are_split_in_the_end(partitioning, n):
 
 
 PATH = np.array([[0.0, 0, 0, 0, 0], [1.0, 4, 0, 0, 0]])
-KNOWN = Evidence(("a", "b", "c"), {"a": (0.0, 3, 0), "b": (4.0, 3, 0), "c": (2.0, 0, 1)}, PATH, (4.0, 0.0, 0.0))
+KNOWN = Evidence(elements=("a", "b", "c"), positions={"a": (0.0, 3, 0), "b": (4.0, 3, 0), "c": (2.0, 0, 1)}, trajectory=PATH, failure_position=(4.0, 0.0, 0.0))
 PARTS = [("a",), ("b",), ("a", "b"), ("c",)]
 
 

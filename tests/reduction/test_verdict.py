@@ -116,13 +116,13 @@ def test_no_more_is_looked_at_than_workers_can_do():
             seen.append(number)
             yield number
 
-    assert len(standing(candidates(), lambda *_: None, Acceptance(4), enough=8)[1]) == 8
+    assert len(standing(candidates(), lambda *_: None, Acceptance(most_misses=4), enough=8)[1]) == 8
     assert seen == [0, 1]
 
 
 @given(broke=broke, places=st.integers(1, 20))
 def test_runs_that_broke_in_the_whole_world_are_left_out_of_the_search_and_no_others(broke, places):
-    rule = Acceptance(4, 0.5, broke=broke)
+    rule = Acceptance(most_misses=4, rate=0.5, broke=broke)
     assert [rule.run(place) for place in range(places)] == [run for run in range(40) if run not in broke][:places]
 
 
@@ -130,12 +130,12 @@ def test_a_broken_run_is_passed_over_where_few_broke_and_in_no_exact_reduction()
     sound = [True, True, True]
 
     def verdict(results, **rule):
-        return standing([0], lambda _, run: results[run], Acceptance(4, 0.5, **rule))[0][0]
+        return standing([0], lambda _, run: results[run], Acceptance(most_misses=4, rate=0.5, **rule))[0][0]
 
     assert verdict([*sound, "broken", *sound]) == verdict([*sound, *sound]) == "similar"
     assert verdict(["broken", *sound, *sound]) == "unknown"
     # A simulator that no longer works costs one run of each candidate.
-    assert standing([0, 1], lambda _, run: None if run else "broken", Acceptance(4)) == (["unknown", "unknown"], [])
+    assert standing([0, 1], lambda _, run: None if run else "broken", Acceptance(most_misses=4)) == (["unknown", "unknown"], [])
     assert verdict([False, False, False, "broken"], exact=(0, 1, 2, 3)) == "unknown"
 
 
@@ -144,7 +144,7 @@ ORDER = {"dissimilar": 0, "": 1, "similar": 2}
 
 @given(most_misses=st.integers(1, 12))
 def test_by_the_papers_rule_the_first_hit_decides(most_misses):
-    rule = Acceptance(most_misses)
+    rule = Acceptance(most_misses=most_misses)
     assert [rule.verdict(0, misses) for misses in range(most_misses)] == [""] * most_misses
     assert rule.verdict(0, most_misses) == "dissimilar"
     assert {rule.verdict(1, misses) for misses in range(most_misses)} == {"similar"}
@@ -168,7 +168,7 @@ def test_every_candidate_is_decided_and_one_without_a_hit_costs_no_more_than_by_
 
 
 def test_where_f_always_shows_one_hit_or_two_misses_are_enough():
-    rule = Acceptance(4, estimated_rate(10, 10))
+    rule = Acceptance(most_misses=4, rate=estimated_rate(10, 10))
     assert rule.verdict(1, 0) == "similar"
     assert rule.verdict(0, 1) == ""
     assert rule.verdict(0, 2) == "dissimilar"
@@ -176,7 +176,7 @@ def test_where_f_always_shows_one_hit_or_two_misses_are_enough():
 
 def test_after_a_step_back_more_hits_are_asked_for():
     hits = [
-        next(hits for hits in range(1, 50) if Acceptance(4, 0.9, steps_back=back).verdict(hits, 0) == "similar")
+        next(hits for hits in range(1, 50) if Acceptance(most_misses=4, rate=0.9, steps_back=back).verdict(hits, 0) == "similar")
         for back in range(4)
     ]
     assert hits == sorted(hits)
@@ -197,7 +197,7 @@ def share_taken(rule, rate, seed):
 @pytest.mark.parametrize("rate", slow(pytest.mark.rates, [0.5, 0.65, 0.8, 0.95, 1.0], but=[0.95]))
 def test_what_keeps_the_rate_is_taken_and_what_shows_f_by_chance_is_not(rate):
     """As often as four runs find it, and far less often than they take another failure."""
-    rule = Acceptance(4, estimated_rate(round(20 * rate), 20))
+    rule = Acceptance(most_misses=4, rate=estimated_rate(round(20 * rate), 20))
     assert share_taken(rule, rate, 1) >= 0.9
     assert share_taken(rule, 0.03, 2) <= 0.06
     # Of a world that shows f in a quarter of the cases, the paper's rule takes 68 %.

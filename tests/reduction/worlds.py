@@ -26,14 +26,14 @@ def evidence(count, seed, **known):
     sensed = {name: float(rng.uniform(0, 2)) for name in elements if rng.random() < 0.7}
     traits = {name: Traits(*rng.uniform(0.1, 2, 2), bool(rng.random() < 0.5)) for name in elements}
     facts = {"first_sensed": sensed, "touched": frozenset(list(sensed)[::3]), "traits": traits, "seed": seed} | known
-    return Evidence(elements, positions, trajectory, tuple(path[-1]), **facts)
+    return Evidence(elements=elements, positions=positions, trajectory=trajectory, failure_position=tuple(path[-1]), **facts)
 
 
 def line(**places):
     """Models on a line, the robot came from x = 5 and failed at 0."""
     positions = {name: (float(x), 0.0, 0.0) for name, x in places.items()}
     trajectory = np.array([[0.0, 5, 0, 0, 0], [1.0, 0, 0, 0, 0]])
-    return Evidence(tuple(places), positions, trajectory, (0.0, 0.0, 0.0))
+    return Evidence(elements=tuple(places), positions=positions, trajectory=trajectory, failure_position=(0.0, 0.0, 0.0))
 
 
 def run(known, is_similar, pair=("model2model", "failure-proximal"), algorithm="ddenv", **options):

@@ -43,22 +43,22 @@ def box_model(name: str, pose: str, size: str, mass: float | None = None, mu: fl
 def link_of(name: str, shape: Shape | None, pose: Pose, mass: float | None = 1.0, mu: float = 1.0) -> Link:
     """A link of one shape; its inertia is about that of a box of 0.4 m."""
     moments = (0.03 * mass,) * 3 if mass else (0.0, 0.0, 0.0)
-    collisions = (Collision("c", shape, pose, mu),) if shape else ()
-    return Link(name, pose, Inertia(mass, pose, moments) if mass else None, collisions, ())
+    collisions = (Collision(name="c", shape=shape, pose=pose, mu=mu),) if shape else ()
+    return Link(name=name, pose=pose, inertia=Inertia(mass, pose, moments) if mass else None, collisions=collisions, visuals=())
 
 
 def joint_of(
     kind: str, parent: str, child: str, at: Vector, axis: Vector = (0.0, 0.0, 1.0), **changes: object
 ) -> Joint:
     """An unlimited joint `at` a place in the world, with changes to its fields."""
-    joint = Joint(f"{parent}_{child}", kind, parent, child, Pose(at), axis, -np.inf, np.inf, np.inf, np.inf, 0.0)
+    joint = Joint(name=f"{parent}_{child}", kind=kind, parent=parent, child=child, pose=Pose(at), axis=axis, lower=-np.inf, upper=np.inf, effort=np.inf, velocity=np.inf, damping=0.0)
     return replace(joint, **changes)
 
 
 def model_of(name: str, *links: Link, joints: tuple[Joint, ...] = (), **changes: object) -> Model:
     """A model made of `links`, static if the first has no mass."""
     static = links[0].inertia is None
-    return replace(Model(name, links[0].pose, static, links, joints, (), 1), **changes)
+    return replace(Model(name=name, pose=links[0].pose, static=static, links=links, joints=joints, spans=(), line=1), **changes)
 
 
 def cube(

@@ -15,7 +15,7 @@ from ddenv.robot.controllers import BadCode, controllers, load
 from ddenv.robot.protocol import Estimate, Reading, Setup, Twist, WheelSpeeds
 from ddenv.world.scenario import Controller
 
-SETUP = Setup((5, 0), 0.5, (0, 0, 0), ("left", "right"), (True, False), 0.1, 0.5, (0, 0, 0, 0), 0.05, 1, 1, 1)
+SETUP = Setup(goal=(5, 0), tolerance=0.5, start=(0, 0, 0), joints=("left", "right"), left=(True, False), radius=0.1, track=0.5, footprint=(0, 0, 0, 0), period=0.05, speed=1, acceleration=1, turn_rate=1)
 READING = Reading(0.0, Estimate(0.0, 0.0, 0.0))
 
 
@@ -150,7 +150,7 @@ def test_whether_it_has_arrived_and_its_setup(tmp_path):
         tmp_path,
         "def __init__(self, setup): self.goal = setup.goal; setup.options['used'] = True\n"
         "def step(self, reading): self.arrived = reading.time > 1; return self.goal",
-        setup := Setup(*(getattr(SETUP, name) for name in SETUP.__slots__[:12]), options={"gain": 2}),
+        setup := replace(SETUP, options={"gain": 2}),
     )
     assert controller.step(READING) == Twist(5.0, 0.0)
     assert not controller.arrived

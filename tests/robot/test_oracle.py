@@ -21,7 +21,7 @@ def path(*points) -> np.ndarray:
 
 def result(outcome: str, trajectory: np.ndarray) -> RunResult:
     failure = {"failed": "stuck", "error": "not-finite"}.get(outcome, "")
-    return RunResult(outcome, failure, trajectory, {}, float(trajectory[-1, 0]), 0.1, 0)
+    return RunResult(outcome=outcome, failure=failure, trajectory=trajectory, motions={}, simulated_seconds=float(trajectory[-1, 0]), wall_seconds=0.1, seed=0)
 
 
 WAY = path((0, 0, 0), (1, 0, 0), (2, 0, 0))

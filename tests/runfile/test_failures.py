@@ -97,7 +97,7 @@ def test_each_other_failure_is_found_with_the_smallest_environment_that_showed_i
 
 def met(*ends: tuple[str, float]) -> RunState:
     tests = [
-        Test(id, 0, "baseline", None, None, id, id, "other", kind, end_pose=(x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+        Test(id=id, environment=0, phase="baseline", round=None, candidate=None, run=id, seed=id, outcome="other", failure=kind, end_pose=(x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
         for id, (kind, x) in enumerate(ends, 1)
     ]
     empty = RunState()

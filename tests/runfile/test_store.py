@@ -17,12 +17,12 @@ from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.state import partition_letter
 from ddenv.runfile.store import LOGS, ROBOT, SCHEMA_VERSION, Live, Recorded, RunFile, create, recorded
 
-CREATED = Created({}, ("Häuser",))
+CREATED = Created(scenario={}, elements=("Häuser",))
 TestFinished.__test__ = False
 
 
 def ended(failure: str = "") -> TestFinished:
-    return TestFinished(1, "pass", failure, None, None, 2.0, 1.0)
+    return TestFinished(test=1, outcome="pass", failure=failure, distance=None, end_pose=None, simulated_seconds=2.0, wall_seconds=1.0)
 
 
 @pytest.fixture
@@ -53,10 +53,10 @@ def test_documents_events_commands_and_motions_come_back(path):
         assert viewer.document("world") == b"<sdf/>"
         assert viewer.send("veto", round=1, candidate=2) == 1
         assert [(one.kind, one.data) for one in engine.commands()] == [("veto", {"round": 1, "candidate": 2})]
-        engine.set_live([Live(1, 7, 0.5, (1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0))])
-        assert viewer.live() == [Live(1, 7, 0.5, (1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0))]
+        engine.set_live([Live(slot=1, test=7, time=0.5, pose=(1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0))])
+        assert viewer.live() == [Live(slot=1, test=7, time=0.5, pose=(1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0))]
         board = {"board": (3.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0)}
-        engine.set_live([Live(1, 7, 0.5, (1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0), board)])
+        engine.set_live([Live(slot=1, test=7, time=0.5, pose=(1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0), models=board)])
         assert viewer.live()[0].models == board
 
 
@@ -251,7 +251,7 @@ def test_a_running_test_without_a_pose_is_told(path, pose):
 )
 def test_a_small_file_cannot_fill_the_memory(partitions, candidates):
     elements = tuple(str(number) for number in range(1000))
-    events = [Recorded(1, 0.0, Created({}, elements)), Recorded(2, 0.0, RoundStarted(1, 2, 0, partitions, candidates))]
+    events = [Recorded(1, 0.0, Created(scenario={}, elements=elements)), Recorded(2, 0.0, RoundStarted(round=1, n_partitions=2, environment=0, partitions=partitions, candidates=candidates))]
     with pytest.raises(UserError, match="is invalid"):
         fold(events)
 

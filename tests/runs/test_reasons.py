@@ -47,7 +47,7 @@ def test_the_sentence_begins_with_what_happens_most_often(found):
 
 
 def test_runs_that_end_far_from_each_other_are_not_said_to_end_near_one_place(found):
-    lost = End("lost", 3, 30.0, (1.0, 2.0), 2.61)
+    lost = End(kind="lost", number=3, seconds=30.0, place=(1.0, 2.0), reach=2.61)
     one = replace(found[1][0], runs=3, ends=(lost,))
     assert "is lost elsewhere, at most 2.7 m from (1.00, 2.00) m (3 of 3" in sentence(one)
 
@@ -86,7 +86,7 @@ def test_trajectories_part_where_they_first_differ_by_more_than_a_tenth_of_a_met
 
 def test_it_says_when_the_robot_met_the_model_and_nothing_where_no_pair_shows_it(found):
     one = found[1][0]
-    met = Parting(1, 2, 7, 1.2, 2.0, (-0.001, 3.0), 1.1, True)
+    met = Parting(with_test=1, without_test=2, seed=7, equal=1.2, apart=2.0, place=(-0.001, 3.0), met=1.1, touched=True)
     assert parting_sentence(replace(one, parting=met)) == (
         "With seed 7 the two runs differ after 1.2 s, and are 0.1 m apart after 2.0 s, at (0.00, 3.00) m. "
         "With it there, the robot touches it after 1.1 s."

@@ -62,7 +62,7 @@ def certified(rate, certify_rate, left, at_least, random):
         (name,) = subject
         return shown.setdefault((name, number), random.random() < rates.get(name, 0.0))
 
-    terms = Terms(certify_rate, max(certify_rate, 0.8), error_of(1), at_least)
+    terms = Terms(certify_rate=certify_rate, keep_rate=max(certify_rate, 0.8), error=error_of(1), at_least=at_least)
     kept = settle(keeps(frozenset([end]), frozenset([whole]), terms), show).verdict == "kept"
     for model in range(left if kept else 0):
         settle(falls(frozenset([str(model)]), frozenset([end]), terms.error_of_models(1.0)), show)

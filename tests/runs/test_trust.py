@@ -119,7 +119,7 @@ def test_a_scenario_that_ddenv_wrote_of_a_run_is_asked_about(scenario, home):
     loaded = load_scenario(scenario(BRINGS["command"]))
     create_run(loaded, run)
     with RunFile(run) as file:
-        file.append(EngineStarted(1, 1, "0.1.0", "none"))
+        file.append(EngineStarted(pid=1, jobs=1, version="0.1.0", simulator="none"))
     export_world(run, written.with_suffix(".sdf"), written)
     save_scenario(loaded, saved)
     for path in (written, saved):

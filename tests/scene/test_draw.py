@@ -88,9 +88,9 @@ def player(writer, stage, words) -> Player:
 
 
 def test_a_link_without_visuals_shows_its_collisions():
-    cube, ball = Collision("c", Box((1, 1, 1)), Pose(), 1.0), Visual("v", Sphere(0.1), Pose(), (1, 0, 0, 1))
-    links = (Link("seen", Pose(), None, (cube,), (ball,)), Link("lost", Pose(), None, (cube,), ()))
-    (painted,) = paint(Model("m", Pose(), True, links, (), (), 1))
+    cube, ball = Collision(name="c", shape=Box((1, 1, 1)), pose=Pose(), mu=1.0), Visual("v", Sphere(0.1), Pose(), (1, 0, 0, 1))
+    links = (Link(name="seen", pose=Pose(), inertia=None, collisions=(cube,), visuals=(ball,)), Link(name="lost", pose=Pose(), inertia=None, collisions=(cube,), visuals=()))
+    (painted,) = paint(Model(name="m", pose=Pose(), static=True, links=links, joints=(), spans=(), line=1))
     assert len(painted.faces) == len(sphere(0.1).faces) + 12
     # The robot is one mesh, too.
     assert np.isfinite(*[item.vertices for item in paint(ROBOT)]).all()
@@ -202,19 +202,19 @@ def test_partitions_have_the_colours_and_letters_of_the_map(writer, screen, play
 
 
 def test_a_large_world_is_a_few_objects(screen):
-    still = [Model(f"m{number}", Pose((number, 0, 0)), True, (_boxed(number),), (), (), 1) for number in range(400)]
-    world = World(ROOT, "large", b"", (0, 0, -9.8), tuple(still))
+    still = [Model(name=f"m{number}", pose=Pose((number, 0, 0)), static=True, links=(_boxed(number),), joints=(), spans=(), line=1) for number in range(400)]
+    world = World(path=ROOT, name="large", text=b"", gravity=(0, 0, -9.8), models=tuple(still))
     scenery = Scenery(Stage(screen.take), world, Wheels(ROBOT), world.elements())
     half = frozenset(f"m{number}" for number in range(200))
-    scenery.show(Shot("start", None, half, frozenset(), frozenset(world.elements()) - half, ""))
+    scenery.show(Shot(kind="start", test=None, models=half, left_out=frozenset(), removed=frozenset(world.elements()) - half, title=""))
     assert len(screen.things) < 20
     assert {
         "/world/models/still",
         "/world/removed/all",
     } < screen.things.keys() and "/world/left-out/all" not in screen.things
-    scenery.show(Shot("start", None, frozenset(), half, frozenset(), ""))
+    scenery.show(Shot(kind="start", test=None, models=frozenset(), left_out=half, removed=frozenset(), title=""))
     assert "/world/models/still" not in screen.things and "/world/left-out/all" in screen.things
-    for message in scenery.still(Shot("start", None, half, frozenset(), frozenset(), "")):
+    for message in scenery.still(Shot(kind="start", test=None, models=half, left_out=frozenset(), removed=frozenset(), title="")):
         screen.take(message)
     assert "/world/models/still" in screen.things and "/world/left-out/all" not in screen.things
     hues = ((1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0))
@@ -223,8 +223,8 @@ def test_a_large_world_is_a_few_objects(screen):
 
 
 def _boxed(number):
-    shape = Collision("c", Box((0.5, 0.5, 0.5)), Pose((number, 0, 0)), 1.0)
-    return Link("l", Pose((number, 0, 0)), None, (shape,), ())
+    shape = Collision(name="c", shape=Box((0.5, 0.5, 0.5)), pose=Pose((number, 0, 0)), mu=1.0)
+    return Link(name="l", pose=Pose((number, 0, 0)), inertia=None, collisions=(shape,), visuals=())
 
 
 def test_heights_of_surfaces(scenery):

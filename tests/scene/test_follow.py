@@ -12,7 +12,7 @@ from ddenv.scene.shot import HOLD, shot, shot_of
 
 
 def live(test: int, slot: int = 0) -> Live:
-    return Live(slot, test, 1.0, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+    return Live(slot=slot, test=test, time=1.0, pose=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
 
 
 def state_of(writer):

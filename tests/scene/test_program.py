@@ -156,13 +156,13 @@ def test_a_page_may_ask_for_itself_and_finished_tests_and_for_nothing_else(url):
 async def test_a_running_test_is_followed(in_round, start_scene):
     in_round.start_test(2, candidate=1)
     with engine_lock(in_round.path):
-        in_round.run.set_live([Live(0, 2, 1.5, (1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
+        in_round.run.set_live([Live(slot=0, test=2, time=1.5, pose=(1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
         url = url_of(start_scene(in_round.path))
         words = captions(await messages(url, titled("round 1 · part B · test 2 · runs now")))[-1]
         assert words["time"] == "1.5 s of 45 s"
         # The board is pushed 0.5 m, and the robot drives 0.3 m, so far as its wheels roll.
         board = {"board": (1.5, -1.5, 0.1, 1.0, 0.0, 0.0, 0.0)}
-        in_round.run.set_live([Live(0, 2, 1.8, (1.3, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0), board)])
+        in_round.run.set_live([Live(slot=0, test=2, time=1.8, pose=(1.3, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0), models=board)])
         found = await messages(url, lambda told: matrix_of(told, "/world/models/003 board")[0, 3])
         assert matrix_of(found, "/world/models/003 board")[:3, 3] == pytest.approx([0.5, 0.0, 0.0])
         wheel = matrix_of(found, "/world/robot/wheel 0")

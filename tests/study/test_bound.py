@@ -45,7 +45,7 @@ def bound(models, needed, misses, baseline_runs=0):
     """That of a result which has left `needed` of `models` models."""
     cell = SimpleNamespace(scenario=SimpleNamespace(reduction=SimpleNamespace(baseline_runs=baseline_runs)))
     names = tuple(map(str, range(models)))
-    return Result(cell, elements=names, left=names[:needed], misses=misses).bound
+    return Result(cell=cell, elements=names, left=names[:needed], misses=misses).bound
 
 
 @pytest.mark.parametrize("iterations", [0, 2])

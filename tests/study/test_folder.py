@@ -10,8 +10,8 @@ from ddenv.study.folder import ABOUT, Session, machine, opened, sessions, versio
 from ddenv.study.plan import RUNS
 
 SESSIONS = (
-    Session(1.5e9, 12.5, 2, 40, "ddenv 1", "a machine, 2 cores"),
-    Session(1.6e9, 0.0, 4, 0, "ddenv 2", "\u05e9"),
+    Session(begun=1.5e9, seconds=12.5, jobs=2, tests=40, versions="ddenv 1", machine="a machine, 2 cores"),
+    Session(begun=1.6e9, seconds=0.0, jobs=4, tests=0, versions="ddenv 2", machine="\u05e9"),
 )
 
 

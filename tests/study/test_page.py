@@ -19,8 +19,8 @@ from tests.study.made import LONGEST, crates, holds, never_failed, plan_of, redu
 from tests.workbench import fake_run
 
 SESSIONS = (
-    Session(1.6e9, 90.0, 2, 30, "ddenv 1", "<b>first</b> machine"),
-    Session(1.7e9, 30.0, 4, 9, "ddenv 2", "second machine"),
+    Session(begun=1.6e9, seconds=90.0, jobs=2, tests=30, versions="ddenv 1", machine="<b>first</b> machine"),
+    Session(begun=1.7e9, seconds=30.0, jobs=4, tests=9, versions="ddenv 2", machine="second machine"),
 )
 
 

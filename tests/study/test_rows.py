@@ -26,20 +26,20 @@ def certificate(left, *verdicts):
     names = (None, *MODELS[:left])
     verdicts = (*verdicts, *("kept", *["needed"] * left)[len(verdicts) :])
     claims = [
-        Claim(name, verdict, 0 if name else 20, 10 if name else 20, 0.0 if name else 0.84, 0.28 if name else 1.0)
+        Claim(without=name, verdict=verdict, shown=0 if name else 20, runs=10 if name else 20, low=0.0 if name else 0.84, high=0.28 if name else 1.0)
         for name, verdict in zip(names, verdicts, strict=True)
     ]
-    return Certificate(1, 1, 10_000, 0.8, 0.95, 0.03, 10, 2 / 3, tuple(claims))
+    return Certificate(number=1, node=1, first_run=10_000, keep_rate=0.8, rate=0.95, error=0.03, at_least=10, certify_rate=2 / 3, claims=tuple(claims))
 
 
 def result_of(cell, tests, left=1, **other):
     """A minimal cell of 16 models, half of whose tests are re-runs, of 3 s each; 40 more of its certificate."""
-    baseline = BaselineFinished(10, 9, 0.9, 0.6, 1.0, 1, (0.0, 0.0, 0.0), 0.0, 1, Outcomes({}, {}))
+    baseline = BaselineFinished(runs=10, failures=9, rate=0.9, low=0.6, high=1.0, failure_test=1, position=(0.0, 0.0, 0.0), miss_chance=0.0, iterations_95=1, judged=Outcomes({}, {}))
     values = {"ended": True, "minimal": True, "problem": "", "elements": MODELS, "left": MODELS[:left]}
     values |= {"tests": tests, "reruns": tests // 2, "seconds": 3.0 * tests, "baseline": baseline, "misses": 4}
     values |= {"certificate": certificate(left), "certificate_tests": 40, "certificate_seconds": 120.0}
     values |= {"whole_f": 19, "whole_runs": 20, "sizes": ((10, 16), (tests, left))}
-    return Result(cell, **(values | other))
+    return Result(cell=cell, **(values | other))
 
 
 def cells(tmp_path, *tests, pairs=FIVE, seeds=1):
@@ -48,7 +48,7 @@ def cells(tmp_path, *tests, pairs=FIVE, seeds=1):
     """
     plan = plan_of(crates(tmp_path, "one"), crates(tmp_path, "two"), pairs=pairs, seeds=seeds)
     made = [
-        Result(cell) if each is None else result_of(cell, abs(each), **(UNCERTIFIED if each < 0 else {}))
+        Result(cell=cell) if each is None else result_of(cell, abs(each), **(UNCERTIFIED if each < 0 else {}))
         for cell, each in zip(plan.cells, tests, strict=True)
     ]
     return plan, made, rows_of(plan, made)

@@ -80,7 +80,7 @@ class FakeRun:
         self.world = world or world_text()
         documents = {"scenario": json.dumps(data).encode(), "world": self.world, "robot": ROBOT_SDF}
         self.elements = list(parse_world(self.world, path).elements(frozenset(data.get("protected", ()))))
-        create(path, documents, Created(data, tuple(self.elements)))
+        create(path, documents, Created(scenario=data, elements=tuple(self.elements)))
         self.file = RunFile(path)
         self.file.own()
         self._writing = Writing(self.file)
@@ -249,7 +249,7 @@ class FakeRun:
         rows = []
         for slot, (test, part) in enumerate(tests):
             t, x, y, z, *quaternion = path_samples()[8 * int(79 * part) :][:8]
-            rows.append(Live(slot, test, t, (x, y, z, *quaternion)))
+            rows.append(Live(slot=slot, test=test, time=t, pose=(x, y, z, *quaternion)))
         self.file.set_live(rows)
 
     def baseline(self, failures: int = 3, runs: int = 4, others: int = 0) -> FakeRun:

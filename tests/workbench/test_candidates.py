@@ -17,7 +17,7 @@ from ddenv.workbench.run.candidates import Candidates
 
 
 def snapshot(run, engine="alive") -> Snapshot:
-    return Snapshot(fold(run.file.events()), tuple(run.file.live()), engine)
+    return Snapshot(state=fold(run.file.events()), live=tuple(run.file.live()), engine=engine)
 
 
 def rows_of(shown: Snapshot) -> list[dict[str, str]]:
@@ -28,18 +28,18 @@ def rows_of(shown: Snapshot) -> list[dict[str, str]]:
 def large(number: int, judged: int = 0) -> Snapshot:
     """A round of so many candidates of which some are judged, each with one test."""
     names = tuple(f"m{place}" for place in range(number // 2))
-    split = Split(names, tuple((name,) for name in names))
+    split = Split(environment=names, partitions=tuple((name,) for name in names))
     found = []
     for index in range(number):
         verdict, tests = ("dissimilar", (index + 1,)) if index < judged else ("", ())
         kind = "complement" if index % 2 else "partition"
-        found.append(Candidate(index, kind, index // 2, split, 0.5, verdict, tests))
+        found.append(Candidate(index=index, kind=kind, partition=index // 2, split=split, distance=0.5, verdict=verdict, tests=tests))
     candidates = PersistentTuple.of(found)
     tests = PersistentTuple.of(
-        runs_state.Test(id, 0, "round", 1, id - 1, 0, 0, "pass", distance=1.0) for id in range(1, judged + 1)
+        runs_state.Test(id=id, environment=0, phase="round", round=1, candidate=id - 1, run=0, seed=0, outcome="pass", distance=1.0) for id in range(1, judged + 1)
     )
     state = RunState(status="running", elements=names, environment=names, tests=tests)
-    return Snapshot(state.changed(round=Round(1, len(names), split, candidates)), (), "alive")
+    return Snapshot(state=state.changed(round=Round(number=1, n_partitions=len(names), split=split, candidates=candidates)), live=(), engine="alive")
 
 
 class Table(App):
@@ -134,10 +134,10 @@ def test_a_search_that_goes_on_has_its_candidates_again(run):
 
 def test_trials_of_this_place_stand_above_the_candidates(run):
     state = snapshot(fake_moments.mid_round(run)).state
-    judged = [Trial(number, ("crate_00",), state.node, verdict="dissimilar", tests=(1,)) for number in range(1, 6)]
-    similar = Trial(6, ("crate_00", "crate_01"), state.node, verdict="similar", tests=(1,))
-    trials = (*judged, similar, Trial(7, (), state.node), Trial(8, (), state.node + 1))
-    rows = rows_of(Snapshot(state.changed(trials=trials), (), "alive"))
+    judged = [Trial(number=number, models=("crate_00",), node=state.node, verdict="dissimilar", tests=(1,)) for number in range(1, 6)]
+    similar = Trial(number=6, models=("crate_00", "crate_01"), node=state.node, verdict="similar", tests=(1,))
+    trials = (*judged, similar, Trial(number=7, models=(), node=state.node), Trial(number=8, models=(), node=state.node + 1))
+    rows = rows_of(Snapshot(state=state.changed(trials=trials), live=(), engine="alive"))
     assert [row["candidate"] for row in rows[:5]] == ["try 4", "try 5", "try 6", "try 7", "part A"]
     assert [row["verdict"] for row in rows[:4]] == ["○ dissimilar", "○ dissimilar", "● a adopts it", ""]
 
@@ -198,7 +198,7 @@ async def test_what_is_looked_at_stays_where_it_is():
         assert app.lines()[1].endswith("○ dissimilar")
         # A trial more moves everything down by a row.
         shown = large(10_000, judged=700)
-        table.show(replace(shown, state=shown.state.changed(trials=(Trial(1, (), 0),))))
+        table.show(replace(shown, state=shown.state.changed(trials=(Trial(number=1, models=(), node=0),))))
         await pilot.pause()
         assert app.lines()[1].startswith("501")
         assert table.under_cursor.index == 9_999

@@ -16,7 +16,7 @@ from tests.shorthand import raw
 
 
 def snapshot(run, engine="alive") -> Snapshot:
-    return Snapshot(fold(run.file.events()), tuple(run.file.live()), engine)
+    return Snapshot(state=fold(run.file.events()), live=tuple(run.file.live()), engine=engine)
 
 
 def told(run, engine="alive") -> tuple[int | None, str]:

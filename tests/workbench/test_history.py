@@ -18,7 +18,7 @@ from ddenv.workbench.widgets.question import Question
 
 def tree(*parents, here=0):
     """The lines of a tree given by each node's parent, with the nodes' numbers."""
-    nodes = [Node(number, parent, "reduced", "", ()) for number, parent in enumerate((None, *parents))]
+    nodes = [Node(number=number, parent=parent, how="reduced", what="", environment=()) for number, parent in enumerate((None, *parents))]
     return [f"{row.lines}{row.node.number}" for row in branches.rows(nodes, here)]
 
 

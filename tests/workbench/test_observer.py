@@ -116,7 +116,7 @@ def test_a_run_that_comes_to_life_is_followed(run, runs):
     assert look(watching).status == "lost"
     engine = fake_run.RunFile(run.path)
     engine.own()
-    engine.append(EngineStarted(1, 2, "0", "none"))
+    engine.append(EngineStarted(pid=1, jobs=2, version="0", simulator="none"))
     with run.engine():
         assert look(watching).status in ("running", "baseline")
     engine.close()

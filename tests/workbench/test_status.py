@@ -16,7 +16,7 @@ from ddenv.workbench.run.status import Header, Status, branch_of, facts, fitted,
 
 
 def snapshot(run, engine="alive", **changes) -> Snapshot:
-    return Snapshot(fold(run.file.events()).changed(**changes), tuple(run.file.live()), engine, spent=83)
+    return Snapshot(state=fold(run.file.events()).changed(**changes), live=tuple(run.file.live()), engine=engine, spent=83)
 
 
 def mid_round(run) -> Snapshot:
@@ -94,7 +94,7 @@ def test_an_engine_that_is_gone_or_of_another_version_is_told(run):
 
 
 def nodes(*parents, rejected=()):
-    return tuple(Node(number, parent, "", "", (), rejected=number in rejected) for number, parent in enumerate(parents))
+    return tuple(Node(number=number, parent=parent, how="", what="", environment=(), rejected=number in rejected) for number, parent in enumerate(parents))
 
 
 def test_a_branch_is_told_unless_it_is_the_newest(run):

@@ -19,7 +19,7 @@ from ddenv.world.sdf.read import parse_world
 
 
 def snapshot(run, engine="alive") -> Snapshot:
-    return Snapshot(fold(run.file.events()), tuple(run.file.live()), engine)
+    return Snapshot(state=fold(run.file.events()), live=tuple(run.file.live()), engine=engine)
 
 
 WORDS = (
@@ -49,7 +49,7 @@ def looks_of(run, candidate=None):
     state = fold(run.file.events())
     prints = footprints(parse_world(run.world, Path("w.sdf")))
     chosen = state.round.candidates[candidate] if candidate is not None else None
-    how = looks(prints, kept(Shown(snapshot=Snapshot(state), candidate=chosen)), mixed((0, 0, 0), (255, 255, 255)))
+    how = looks(prints, kept(Shown(snapshot=Snapshot(state=state), candidate=chosen)), mixed((0, 0, 0), (255, 255, 255)))
     return {each.name: (kind, label) for each, kind, label in zip(prints, how.kinds, how.signs.texts, strict=True)}
 
 

@@ -43,12 +43,12 @@ def test_every_point_is_in_the_box_and_some_are_on_each_side(case, pose):
 
 
 def model(*collisions: Collision) -> Model:
-    return Model("m", Pose((7, 8, 9)), True, (Link("l", Pose(), None, collisions, ()),), (), (), 1)
+    return Model(name="m", pose=Pose((7, 8, 9)), static=True, links=(Link(name="l", pose=Pose(), inertia=None, collisions=collisions, visuals=()),), joints=(), spans=(), line=1)
 
 
 def test_a_model_is_the_box_around_all_its_shapes_but_planes():
-    boxes = [Collision("c", Box((1, 1, 1)), Pose((x, 0, 0)), 1.0) for x in (0, 4)]
-    plane = Collision("p", Plane((1, 1)), Pose((90, 0, 0)), 1.0)
+    boxes = [Collision(name="c", shape=Box((1, 1, 1)), pose=Pose((x, 0, 0)), mu=1.0) for x in (0, 4)]
+    plane = Collision(name="p", shape=Plane((1, 1)), pose=Pose((90, 0, 0)), mu=1.0)
     low, high = model_bounds(model(*boxes, plane))
     assert (low.tolist(), high.tolist()) == ([-0.5, -0.5, -0.5], [4.5, 0.5, 0.5])
     assert center(model(*boxes)) == (2, 0, 0)

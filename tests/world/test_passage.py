@@ -27,19 +27,19 @@ FAR = Goal(x=6.0, y=0.0)
 
 def block(x: float, y: float, *size: float, z: float = 0.0, yaw: float = 0.0, pitch: float = 0.0) -> Collision:
     """A box that stands at the height `z`."""
-    return Collision("c", Box(size), Pose.from_rpy(x, y, z + size[2] / 2, 0.0, pitch, yaw), 1.0)
+    return Collision(name="c", shape=Box(size), pose=Pose.from_rpy(x, y, z + size[2] / 2, 0.0, pitch, yaw), mu=1.0)
 
 
 def world_of(*shapes: Collision, static: bool = True, yaw: float = 0.0) -> World:
     """The ground, and one model of these shapes, turned about the origin."""
     turn = Pose.from_rpy(0.0, 0.0, 0.0, 0.0, 0.0, yaw)
     turned = tuple(replace(one, pose=turn @ one.pose) for one in shapes)
-    ground = (Collision("c", Plane((1.0, 1.0)), Pose(), 1.0),)
+    ground = (Collision(name="c", shape=Plane((1.0, 1.0)), pose=Pose(), mu=1.0),)
     models = (
-        Model(name, Pose(), still, (Link("l", Pose(), None, own, ()),), (), (), 1)
+        Model(name=name, pose=Pose(), static=still, links=(Link(name="l", pose=Pose(), inertia=None, collisions=own, visuals=()),), joints=(), spans=(), line=1)
         for name, still, own in (("ground", True, ground), ("house", static, turned))
     )
-    return World(Path("w.sdf"), "w", b"", (0.0, 0.0, -9.8), tuple(models))
+    return World(path=Path("w.sdf"), name="w", text=b"", gravity=(0.0, 0.0, -9.8), models=tuple(models))
 
 
 def room(*between: Collision, thick: float = 0.1) -> list[Collision]:
@@ -84,7 +84,7 @@ def test_a_robot_that_does_not_fit_is_told_how_wide_the_door_is():
 def roof(height: float) -> list[Collision]:
     """A mesh across the room, 2 m wide, that rises to this height, m, on both sides."""
     corners = [(x, y, z) for y in (-2.0, 2.0) for x, z in ((-1.0, 0.0), (1.0, 0.0), (0.0, height))]
-    return [Collision("c", Mesh("roof", *convex_hull(np.array(corners))), Pose(), 1.0)]
+    return [Collision(name="c", shape=Mesh("roof", *convex_hull(np.array(corners))), pose=Pose(), mu=1.0)]
 
 
 RAMP = [block(0.0, 0.0, 1.0, 4.0, 0.5), *(block(x, 0.0, 2.0, 4.0, 0.01, z=0.2, pitch=x / 3) for x in (-1.2, 1.2))]
@@ -99,7 +99,7 @@ RAMP = [block(0.0, 0.0, 1.0, 4.0, 0.5), *(block(x, 0.0, 2.0, 4.0, 0.01, z=0.2, p
         "lintel": ([block(0.0, 0.0, 1.0, 4.0, 0.5, z=0.5)], False),
         "table": ([block(0.0, 0.0, 1.0, 4.0, 0.05, z=0.3)], True),
         "slope": (roof(0.8), False),
-        "pillar": ([Collision("c", Cylinder(1.5, 2.0), Pose((0.0, 0.0, 1.0)), 1.0)], True),
+        "pillar": ([Collision(name="c", shape=Cylinder(1.5, 2.0), pose=Pose((0.0, 0.0, 1.0)), mu=1.0)], True),
     }.values(),
 )
 def test_what_is_driven_over_or_under_does_not_block(between, blocks):

@@ -53,7 +53,7 @@ turned = st.tuples(*[st.floats(-3, 3)] * 3)
 
 
 def body(shape, position=(0, 0, 0), rpy=(0, 0, 0)) -> Hull:
-    return hull(Collision("c", shape, Pose.from_rpy(*position, *rpy), 1.0))
+    return hull(Collision(name="c", shape=shape, pose=Pose.from_rpy(*position, *rpy), mu=1.0))
 
 
 def mesh_of(points: np.ndarray) -> Mesh:
@@ -156,9 +156,9 @@ def test_the_place_that_the_error_names_is_free_and_near(z):
 
 
 def world_with(shape: Shape, pose: Pose) -> World:
-    link = Link("l", pose, None, (Collision("c", shape, pose, 1.0),), ())
-    model = Model("thing", pose, True, (link,), (), (), 1)
-    return World(Path("w.sdf"), "w", b"", (0.0, 0.0, -9.8), (model,))
+    link = Link(name="l", pose=pose, inertia=None, collisions=(Collision(name="c", shape=shape, pose=pose, mu=1.0),), visuals=())
+    model = Model(name="thing", pose=pose, static=True, links=(link,), joints=(), spans=(), line=1)
+    return World(path=Path("w.sdf"), name="w", text=b"", gravity=(0.0, 0.0, -9.8), models=(model,))
 
 
 @pytest.mark.parametrize(
@@ -194,7 +194,7 @@ def test_the_start_on_terrain_is_at_its_height():
 
 
 def test_a_robot_without_shapes_cannot_start():
-    ghost = Model("ghost", Pose(), False, (Link("l", Pose(), None, (), ()),), (), (), 1)
+    ghost = Model(name="ghost", pose=Pose(), static=False, links=(Link(name="l", pose=Pose(), inertia=None, collisions=(), visuals=()),), joints=(), spans=(), line=1)
     with pytest.raises(UserError, match="'ghost' has no collision shapes"):
         check_spawn(WALL, ghost, Spawn(x=0, y=0, z=1))
 

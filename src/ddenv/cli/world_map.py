@@ -90,7 +90,7 @@ def _view(low: np.ndarray, high: np.ndarray, columns: int, rows: int) -> View:
     x, y = ((low + high) / 2).tolist()
     needs = math.ceil(wide / scale - 1e-6)
     need_rows = math.ceil(tall / (2 * scale) - 1e-6)
-    return View(x, y, scale, min(columns, max(2 * NUMBERS, needs)), min(rows, max(3, need_rows)))
+    return View(x=x, y=y, scale=scale, columns=min(columns, max(2 * NUMBERS, needs)), rows=min(rows, max(3, need_rows)))
 
 
 # The legend.

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Finding:
     """`says` what is so about `what`; `state` is "ok", "note" (worth knowing) or "wrong"; `advice` is what to do about it."""
 

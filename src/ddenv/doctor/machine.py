@@ -29,16 +29,16 @@ LITTLE_MEMORY = 1_500_000_000
 
 
 def installation() -> Iterator[Finding]:
-    yield Finding("installation", "ddenv", f"{__version__}, {Path(__file__).parents[1]}")
-    yield Finding("installation", "Python", f"{platform.python_version()}, {sys.executable}")
+    yield Finding(group="installation", what="ddenv", says=f"{__version__}, {Path(__file__).parents[1]}")
+    yield Finding(group="installation", what="Python", says=f"{platform.python_version()}, {sys.executable}")
     for name, module in NEEDED.items():
         if importlib.util.find_spec(module) is not None:
-            yield Finding("installation", name, _version(name))
+            yield Finding(group="installation", what=name, says=_version(name))
         elif name == "drake" and sys.platform == "win32":
-            yield Finding("installation", name, "not for Windows: runs can be viewed here, not made", "note")
+            yield Finding(group="installation", what=name, says="not for Windows: runs can be viewed here, not made", state="note")
         else:
-            yield Finding("installation", name, "not installed", "wrong", f"pip install {name}")
-    yield Finding("installation", "SQLite", sqlite3.sqlite_version)
+            yield Finding(group="installation", what=name, says="not installed", state="wrong", advice=f"pip install {name}")
+    yield Finding(group="installation", what="SQLite", says=sqlite3.sqlite_version)
 
 
 def _version(name: str) -> str:
@@ -50,18 +50,18 @@ def _version(name: str) -> str:
 
 def terminal() -> Iterator[Finding]:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        yield Finding("terminal", "terminal", "none: input or output is not a terminal; 'ddenv run' works without one")
+        yield Finding(group="terminal", what="terminal", says="none: input or output is not a terminal; 'ddenv run' works without one")
     else:
         columns, lines = shutil.get_terminal_size()
         small = columns < SMALLEST[0] or lines < SMALLEST[1]
         advice = f"the workbench is designed for {SMALLEST[0]} by {SMALLEST[1]} or more" if small else ""
-        yield Finding("terminal", "size", f"{columns} columns, {lines} lines", "note" if small else "ok", advice)
+        yield Finding(group="terminal", what="size", says=f"{columns} columns, {lines} lines", state="note" if small else "ok", advice=advice)
 
 
 def machine() -> Iterator[Finding]:
     cores = processor.usable_cores()
     all_cores = os.cpu_count() or 1
-    yield Finding("machine", "cores", f"{cores} of {all_cores} may be used; {processor.name()}")
+    yield Finding(group="machine", what="cores", says=f"{cores} of {all_cores} may be used; {processor.name()}")
     yield _memory()
     yield _space("temporary files", Path(tempfile.gettempdir()), "machine")
 
@@ -70,16 +70,16 @@ def _memory() -> Finding:
     usable = processor.usable_memory()
     free = processor.free_memory()
     if not math.isfinite(usable + free):
-        return Finding("machine", "memory", "unknown")
+        return Finding(group="machine", what="memory", says="unknown")
     says = f"{usable / 1e9:.1f} GB may be used, {free / 1e9:.1f} GB are free"
     if free >= LITTLE_MEMORY:
-        return Finding("machine", "memory", says)
-    return Finding("machine", "memory", says, "note", "run fewer tests at the same time: --jobs 1")
+        return Finding(group="machine", what="memory", says=says)
+    return Finding(group="machine", what="memory", says=says, state="note", advice="run fewer tests at the same time: --jobs 1")
 
 
 def runs() -> Iterator[Finding]:
     folder = runs_folder()
-    yield Finding("runs", "folder", f"{folder}, {count(len(list(folder.glob(f'*{SUFFIX}'))), 'run')}")
+    yield Finding(group="runs", what="folder", says=f"{folder}, {count(len(list(folder.glob(f'*{SUFFIX}'))), 'run')}")
     nearest = next(each for each in (folder, *folder.parents) if each.exists())
     yield _space("disk space", nearest, "runs")
 
@@ -94,7 +94,7 @@ def _space(what: str, folder: Path, group: str) -> Finding:
     except OSError as error:
         says = f"{folder} cannot be written: {error.strerror}"
         advice = "set another one in DDENV_HOME or TMPDIR"
-        return Finding(group, what, says, "wrong", advice)
+        return Finding(group=group, what=what, says=says, state="wrong", advice=advice)
     if free < LITTLE_SPACE:
-        return Finding(group, what, says, "note", "a run needs up to a few hundred MB")
-    return Finding(group, what, says)
+        return Finding(group=group, what=what, says=says, state="note", advice="a run needs up to a few hundred MB")
+    return Finding(group=group, what=what, says=says)

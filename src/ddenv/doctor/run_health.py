@@ -6,7 +6,6 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 
 from ddenv import __version__
@@ -19,7 +18,9 @@ from ddenv.runs.programs import last_words
 from ddenv.runs.subject import read_parts
 from ddenv.text import count
 
-_finding = partial(Finding, "run")
+
+def _finding(what: str, says: str, state: str = "ok", advice: str = "") -> Finding:
+    return Finding(group="run", what=what, says=says, state=state, advice=advice)
 
 
 def run_health(path: Path) -> list[Finding]:
@@ -43,9 +44,9 @@ def repair(path: Path, copy: Path) -> list[Finding]:
         found = rescue(file, copy)
     words = _how_much(found)
     if not found.trouble:
-        return [Finding("copy", "copy", f"{copy}: complete, {words}")]
+        return [Finding(group="copy", what="copy", says=f"{copy}: complete, {words}")]
     again = f"ddenv resume {copy} repeats the rest"
-    return [Finding("copy", "copy", f"{copy}: {words}; everything after them is lost: {found.trouble}", "note", again)]
+    return [Finding(group="copy", what="copy", says=f"{copy}: {words}; everything after them is lost: {found.trouble}", state="note", advice=again)]
 
 
 @contextmanager

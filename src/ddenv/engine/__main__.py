@@ -112,13 +112,13 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
                 Driver(scenario, world, journal, bench, control).reduce()
     except Stopped as stop:
         journal.lose_running()
-        journal.record(events.EngineStopped(str(stop)))
+        journal.record(events.EngineStopped(reason=str(stop)))
         return 1
     except Exception as error:
         journal.lose_running()
         # Of a bug in ddenv the traceback goes to the log, and views show the reason.
         bug = f"unexpected {type(error).__name__}: {error} (see the log beside the run)"
-        journal.record(events.EngineFailed(str(error) if isinstance(error, UserError) else bug))
+        journal.record(events.EngineFailed(reason=str(error) if isinstance(error, UserError) else bug))
         raise
     finally:
         file.set_live([])
@@ -128,10 +128,10 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
 
 def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:
     # This event comes first: all events before it are another engine's.
-    journal.record(events.EngineStarted(os.getpid(), jobs, __version__, simulator(), machine()))
+    journal.record(events.EngineStarted(pid=os.getpid(), jobs=jobs, version=__version__, simulator=simulator(), machine=machine()))
     journal.lose_running()
     if accept_mode not in (None, journal.state.accept_mode):
-        journal.record(events.AcceptModeChanged(accept_mode or ""))
+        journal.record(events.AcceptModeChanged(mode=accept_mode or ""))
 
 
 def _give_up(file: RunFile) -> int:
@@ -149,7 +149,7 @@ def _workers(scenario: Scenario, world: World, robot: Model, jobs: int, cluster:
     from ddenv.engine.cluster.cluster_pool import ClusterPool
 
     return ClusterPool(
-        scenario, world, robot, cluster, lambda tests, words: journal.record(events.Cluster(tests, words))
+        scenario, world, robot, cluster, lambda tests, words: journal.record(events.Cluster(jobs=tests, words=words))
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import NoReturn
 
 import numpy as np
@@ -31,6 +32,7 @@ from ddenv.runfile.events import (
     Implied,
     SupportsStarted,
     TestFinished,
+    TestStart,
     TestStarted,
     TrialJudged,
 )
@@ -71,7 +73,7 @@ class Bench:
         self._next_live = 0.0
         self._live_shown = False
         self._broken = 0
-        self.rule = Acceptance(1)
+        self.rule = Acceptance(most_misses=1)
 
     def work(self, tests: Sequence[Test]) -> None:
         """Starts as many of the wanted tests as workers are free, and looks around once.
@@ -123,12 +125,21 @@ class Bench:
         number = len(state.tests) + 1
         seed = seed_of(reduction, wanted.run)
         of_round = state.round is not None and wanted.why == "round"
-        round, candidate = (journal.current.number, wanted.candidate) if of_round else (None, None)
-        start = number, environment, wanted.run, seed, wanted.why, round, candidate, trial, wanted.without
+        start = TestStart(
+            test=number,
+            environment=environment,
+            run=wanted.run,
+            seed=seed,
+            phase=wanted.why,
+            round=journal.current.number if of_round else None,
+            candidate=wanted.candidate if of_round else None,
+            trial=trial,
+            without=wanted.without,
+        )
         if implied and source is not None:
-            journal.record(Implied(*start, by=source), {ROBOT: source})
+            journal.record(Implied(**asdict(start), by=source), {ROBOT: source})
             return True
-        journal.record(TestStarted(*start, source))
+        journal.record(TestStarted(**asdict(start), audits=source))
         self._started.add((wanted.environment, wanted.run, full))
         # To be compared, it ends as the other one did.
         full = full or (source is not None and not state.test(source).cut)
@@ -138,7 +149,7 @@ class Bench:
             self._taken.append((number, taken))
         else:
             ends = None if full or not self._known() else ends_of(self._known())
-            self._pool.submit(number, Run(keep, seed, ends, wall_limit(state)))
+            self._pool.submit(number, Run(keep=keep, seed=seed, ends=ends, limit=wall_limit(state)))
         return False
 
     def settle(self) -> Start | Broken:
@@ -171,7 +182,7 @@ class Bench:
                 f"this is {state.physics.now}; 'ddenv resume {run} --mixed' continues anyway, 'ddenv resume {run} --again' "
                 "repeats all tests in a new run"
             )
-        self._journal.record(Compared(result is None))
+        self._journal.record(Compared(same=result is None))
 
     def made_again(self, test: KnownTest, tells: bool = True) -> Result | None:
         """Makes a test again, once all workers are idle; returns how it ended unless the robot's way repeats bit for bit.
@@ -184,12 +195,12 @@ class Bench:
         journal = self._journal
         state = journal.state
         if tells:
-            journal.record(Comparing(test.id))
+            journal.record(Comparing(test=test.id))
         keep = frozenset(state.environments[test.environment].names(state.elements))
         # It ends as the one that was simulated.
         simulated = test if test.implied_by is None else state.test(test.implied_by)
         ends = ends_of(self._known()) if simulated.cut else None
-        self._pool.submit(0, Run(keep, test.seed, ends, wall_limit(state)))
+        self._pool.submit(0, Run(keep=keep, seed=test.seed, ends=ends, limit=wall_limit(state)))
         while not (ended := self._pool.finished(WAIT)):
             self._control.poll()
         result = ended[0][1]
@@ -215,9 +226,9 @@ class Bench:
             if verdict:
                 runs = decided_by(self._journal.shown, environment, self.rule).runs
                 tests = self._journal.tests(environment, map(self.rule.run, range(runs)))
-                self._journal.record(TrialJudged(trial.number, verdict, tests))
+                self._journal.record(TrialJudged(trial=trial.number, verdict=verdict, tests=tests))
             for _, run in wanted:
-                test = Test(environment, run, "hand")
+                test = Test(environment=environment, run=run, why="hand")
                 if self._key(test) in self._started:
                     continue
                 if not self._pool.idle or self._make(test, trial.number) is None:
@@ -305,7 +316,7 @@ class Bench:
             data[name] = journal.in_order(data[name])
         if "took_part" in data:
             data["took_part"] = journal.models(data["took_part"])
-        journal.record(TestFinished(test, **data), motions_of(result))
+        journal.record(TestFinished(test=test, **data), motions_of(result))
         compare(journal, [journal.state.test(test)])
         if before is not None and before.cut and data["outcome"] not in (before.outcome, *BROKEN) and not data["cut"]:
             journal.record(EarlyStopEnded(test=before.id, by=test))

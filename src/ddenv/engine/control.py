@@ -150,7 +150,7 @@ class Control:
         jump = offset - self._offset
         self._offset = offset
         if abs(jump) > SMALL:
-            self._journal.record(events.ClockJumped(jump))
+            self._journal.record(events.ClockJumped(seconds=jump))
         for command in self._journal.file.commands(self._journal.state.last_command):
             self._obey(command)
             self._last = time.monotonic()
@@ -216,7 +216,7 @@ class Control:
             except UserError as error:
                 why = str(error)
             if why:
-                self._journal.record(events.CommandRefused(why))
+                self._journal.record(events.CommandRefused(why=why))
         finally:
             # A stop raises an exception, and must not be read again.
             self._journal.command = None
@@ -268,7 +268,7 @@ class Control:
         state = self._journal.state
         failures = failures_at(state, node)
         outcomes = None if failures == state.failures else _judged(self._journal, failures)
-        self._journal.record(events.WentBack(node, rejected, outcomes))
+        self._journal.record(events.WentBack(node=node, rejected=rejected, judged=outcomes))
 
 
 def _judged(journal: Journal, failures: Numbers) -> events.Outcomes:
@@ -282,21 +282,21 @@ def _changed(journal: Journal, asked: c.Change) -> events.Event:
     state = journal.state
     new = asked.new(state)
     if c.JUDGES.isdisjoint(new) or state.baseline is None:
-        return events.Changed(new)
+        return events.Changed(settings=new)
     # Stored ends are judged again.
     after = state.changed(scenario=with_settings(state.scenario, new))
-    return events.Changed(new, fixed_again(journal.file, after))
+    return events.Changed(settings=new, baseline=fixed_again(journal.file, after))
 
 
 def _adopted(journal: Journal, asked: c.Adopt) -> events.Event:
     trial = journal.state.trials[asked.trial - 1]
-    return events.Adopted(asked.trial, trial.environment, trial.tests[-1])
+    return events.Adopted(trial=asked.trial, environment=trial.environment, evidence_test=trial.tests[-1])
 
 
 def _left_out(journal: Journal, asked: c.LeaveOut) -> events.Event:
     test = asked.evidence(journal.state)
     assert test is not None
-    return events.LeftOut(asked.model, test.environment, test.id, by_user=True)
+    return events.LeftOut(without=asked.model, environment=test.environment, evidence_test=test.id, by_user=True)
 
 
 def _accepted_other(journal: Journal, asked: c.AcceptOther) -> events.Event:
@@ -306,20 +306,20 @@ def _accepted_other(journal: Journal, asked: c.AcceptOther) -> events.Event:
     what = f"test {test.id}" if unnamed else c.label_of(state, test)
     judged = _judged(journal, (test.id,) if asked.instead else (*state.failures, test.id))
     trial = None if asked.instead else test.trial
-    return events.AcceptedOther(test.id, what, test.environment, judged, trial, asked.instead)
+    return events.AcceptedOther(test=test.id, what=what, environment=test.environment, judged=judged, trial=trial, instead=asked.instead)
 
 
 # What each decision of the user is in the run file.
 _EVENTS: dict[type[c.Command], Callable[[Journal, Any], events.Event]] = {
-    c.AcceptMode: lambda journal, asked: events.AcceptModeChanged(asked.mode),
-    c.Accept: lambda journal, asked: events.Decided(asked.round, asked.candidate, "accept"),
-    c.Reject: lambda journal, asked: events.Decided(asked.round, asked.candidate, "reject"),
-    c.Veto: lambda journal, asked: events.Vetoed(asked.round, asked.candidate),
-    c.Unveto: lambda journal, asked: events.Unvetoed(asked.round, asked.candidate),
-    c.Pin: lambda journal, asked: events.Pinned(c.numbers_of(journal.state, asked.new(journal.state))),
-    c.Unpin: lambda journal, asked: events.Unpinned(c.numbers_of(journal.state, asked.pinned(journal.state))),
+    c.AcceptMode: lambda journal, asked: events.AcceptModeChanged(mode=asked.mode),
+    c.Accept: lambda journal, asked: events.Decided(round=asked.round, candidate=asked.candidate, decision="accept"),
+    c.Reject: lambda journal, asked: events.Decided(round=asked.round, candidate=asked.candidate, decision="reject"),
+    c.Veto: lambda journal, asked: events.Vetoed(round=asked.round, candidate=asked.candidate),
+    c.Unveto: lambda journal, asked: events.Unvetoed(round=asked.round, candidate=asked.candidate),
+    c.Pin: lambda journal, asked: events.Pinned(models=c.numbers_of(journal.state, asked.new(journal.state))),
+    c.Unpin: lambda journal, asked: events.Unpinned(models=c.numbers_of(journal.state, asked.pinned(journal.state))),
     c.Try: lambda journal, asked: events.TrialStarted(
-        len(journal.state.trials) + 1, journal.number(Environment.of(asked.models))
+        trial=len(journal.state.trials) + 1, environment=journal.number(Environment.of(asked.models))
     ),
     c.Adopt: _adopted,
     c.LeaveOut: _left_out,

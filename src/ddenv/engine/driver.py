@@ -100,7 +100,7 @@ class Driver:
         journal = self._journal
         reduction = self._reduction
         # Unknown names are refused before a robot runs.
-        self.algorithm(steps.Leg(1, NOTHING, (NOTHING,), NOTHING, {}, Acceptance(1)))
+        self.algorithm(steps.Leg(first_round=1, whole=NOTHING, chain=(NOTHING,), pinned=NOTHING, free={}, rule=Acceptance(most_misses=1)))
         self._settle()
         leg = None if journal.state.baseline is None else self._first_leg()
         whole = journal.state.environments[0]
@@ -131,11 +131,11 @@ class Driver:
                 for about, words in notes_on(self._world, found.settled):
                     note(journal, about, words)
                 ties = None if found.ties is None else journal.pairs(found.ties)
-                journal.record(events.Supports(journal.pairs(found.supports), ties))
+                journal.record(events.Supports(pairs=journal.pairs(found.supports), ties=ties))
                 return
             why = f"it is not known which models rest on which: {found.failure}"
             if not needed:
-                journal.record(events.Supports((), why=found.failure))
+                journal.record(events.Supports(pairs=(), why=found.failure))
         if needed:
             raise UserError(f"reduction.keep_supports: {why}")
 
@@ -192,7 +192,7 @@ class Driver:
             before = journal.state
             first = 1 if before.round is None else before.round.number + 1
             rate = journal.rate_of_whole() if before.scenario["reduction"]["accept_rate"] == "kept" else 0.0
-            journal.record(events.LegStarted(first, before.nodes[before.node].n_partitions, rate))
+            journal.record(events.LegStarted(round=first, n_partitions=before.nodes[before.node].n_partitions, rate=rate))
         leg = journal.state.leg
         assert leg is not None
         self._reduction = Reduction.model_validate(leg.settings)
@@ -204,8 +204,8 @@ class Driver:
         stays = journal.models(leg.pinned)
         stays |= together.of_any(stays)
         free = {model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)}
-        rule = Acceptance(1 + asked.iterations, leg.rate, asked.keep_rate, leg.steps_back, broke=broken_runs(state))
-        rule = self._bench.rule = Acceptance(len(exact), exact=exact) if exact else rule
+        rule = Acceptance(most_misses=1 + asked.iterations, rate=leg.rate, keep_rate=asked.keep_rate, steps_back=leg.steps_back, broke=broken_runs(state))
+        rule = self._bench.rule = Acceptance(most_misses=len(exact), exact=exact) if exact else rule
         chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
         self._leg = steps.Leg(
             first_round=leg.first_round,
@@ -360,21 +360,21 @@ class Driver:
         environment = Environment.of(round.environment) | leg.pinned
         journal.record(
             events.RoundStarted(
-                number,
-                round.n_partitions,
-                journal.number(environment),
-                tuple(tuple(sorted(part)) for part in round.partitions),
-                tuple((one.kind, one.partition, scores[one.partition]) for one in round.candidates),
-                leg.pinned & environment,
+                round=number,
+                n_partitions=round.n_partitions,
+                environment=journal.number(environment),
+                partitions=tuple(tuple(sorted(part)) for part in round.partitions),
+                candidates=tuple((one.kind, one.partition, scores[one.partition]) for one in round.candidates),
+                pinned=leg.pinned & environment,
             )
         )
         models = sum(stack <= environment for stack in leg.free.values())
         expected = search_tests(models, self._reduction, known_failure(journal.state).rate)
-        journal.record(events.Forecast(number, expected, journal.state.tests_done))
+        journal.record(events.Forecast(round=number, tests=expected, tests_done=journal.state.tests_done))
         refused = {refusal.environment: refusal.verdict for refusal in journal.state.refused}
         for index, one in enumerate(round.candidates) if refused else ():
             if verdict := refused.get(one.models | leg.pinned):
-                journal.record(events.Vetoed(number, index, verdict, again=True))
+                journal.record(events.Vetoed(round=number, candidate=index, verdict=verdict, again=True))
 
     def judged(self, index: int, environment: Environment, verdict: str, runs: int) -> None:
         """Records a verdict, unless an earlier engine has."""
@@ -385,7 +385,7 @@ class Driver:
         if round.candidates[index].verdict:
             return
         tests = journal.tests(environment, map(self._leg.rule.run, range(runs)))
-        journal.record(events.CandidateJudged(round.number, index, verdict, tests))
+        journal.record(events.CandidateJudged(round=round.number, candidate=index, verdict=verdict, tests=tests))
 
     def similar(self, number: int, index: int, environment: Environment) -> bool:
         """In accept mode `ask`, waits for the user, who may also choose an earlier candidate."""
@@ -393,21 +393,21 @@ class Driver:
         if journal.current.winner == index:
             return True
         if journal.state.accept_mode == "ask" and journal.current.accepted != index:
-            journal.record(events.Waiting(number, index))
+            journal.record(events.Waiting(round=number, candidate=index))
             while journal.state.accept_mode == "ask" and journal.state.waiting_candidate == index:
                 self._bench.tick()
             if journal.state.waiting_candidate == index:
-                journal.record(events.Decided(number, index, "accept"))
+                journal.record(events.Decided(round=number, candidate=index, decision="accept"))
             if journal.current.accepted != index:
                 return False
         test = journal.evidence_of(journal.current.candidates[index].tests)
-        journal.record(events.Reduced(number, index, journal.number(environment), test))
+        journal.record(events.Reduced(round=number, candidate=index, environment=journal.number(environment), evidence_test=test))
         return True
 
     def round_ended(self, number: int, winner: int | None) -> None:
         journal = self._journal
         if not journal.current.done:
-            journal.record(events.RoundFinished(number))
+            journal.record(events.RoundFinished(round=number))
             self._control.round_finished()
         assert journal.state.leg is not None
         past = journal.state.leg.past[-1]
@@ -469,7 +469,7 @@ class Driver:
             rate = journal.rate_of_whole()
             share = self._certify_rate or asked.certify_rate
             note_price(journal, share, at_least)
-            started = events.CertificateStarted(number, first, rate, asked.keep_rate, error, at_least, share, seeds)
+            started = events.CertificateStarted(certificate=number, run=first, rate=rate, keep_rate=asked.keep_rate, error=error, at_least=at_least, certify_rate=share, seeds=seeds)
             journal.record(started)
             last = journal.state.certificates[-1]
         terms = terms_of(journal.state, last)
@@ -484,7 +484,7 @@ class Driver:
             claims = tuple(self._claim_made(claim, first, exactly) for claim in made.claims)
             rested_on = journal.full_tests((test for one in made.claims for test in one.claim.rests_on), first)
             tests = tuple(sorted({*rested_on, *chosen}))
-            journal.record(events.CertificateFinished(claims, tests, self._elsewhere(tests)))
+            journal.record(events.CertificateFinished(claims=claims, tests=tests, elsewhere=self._elsewhere(tests)))
         self._end_early_stop_if_refuted()
 
     def _end_early_stop_if_refuted(self) -> None:
@@ -544,16 +544,25 @@ class Driver:
         number = journal.number(named.environment)
         claim = named.claim
         share = shown / max(1, sound)
-        interval = (share, share) if named.exact else anytime_interval(shown, sound)
-        verdict = "not shown" if named.exact and not exactly else claim.verdict
-        return events.ClaimMade(named.model, number, verdict, shown, sound, *interval, dict(outcomes), claim.bound)
+        low, high = (share, share) if named.exact else anytime_interval(shown, sound)
+        return events.ClaimMade(
+            without=named.model,
+            environment=number,
+            verdict="not shown" if named.exact and not exactly else claim.verdict,
+            shown=shown,
+            runs=sound,
+            low=low,
+            high=high,
+            outcomes=dict(outcomes),
+            bound=claim.bound,
+        )
 
     def stepped_back(self, place: int, again: tuple[Partition, ...], tests: tuple[NumberedRun, ...]) -> NoReturn:
         journal = self._journal
         nodes = self._nodes(journal.state.node)
         node = nodes[place].number
         lost = nodes[place + 1].number
-        journal.record(events.RateLost(node, lost, again, journal.full_tests(tests)))
+        journal.record(events.RateLost(node=node, lost=lost, again=again, tests=journal.full_tests(tests)))
         self._bench.wait_for_search()
 
     def left_out(self, model: int, environment: Environment) -> NoReturn:
@@ -561,7 +570,7 @@ class Driver:
         first = self._certificate.first_run
         runs = range(first, journal.fresh_run)
         evidence = journal.evidence_of(journal.tests(environment, runs, full=True))
-        journal.record(events.LeftOut(model, journal.number(environment), evidence))
+        journal.record(events.LeftOut(without=model, environment=journal.number(environment), evidence_test=evidence))
         self._bench.wait_for_search()
 
     # The end.
@@ -594,4 +603,4 @@ class Driver:
             note(self._journal, about, f"what is left has {words}")
         # Tests of later candidates are no longer needed.
         self._journal.lose_running()
-        self._journal.record(events.Finished(minimal, reason))
+        self._journal.record(events.Finished(minimal=minimal, reason=reason))

@@ -45,7 +45,7 @@ def isolate(world: World, journal: Journal, bench: Bench, at_least: int | None, 
     journal.lose_running()
     _open(journal)
     whole = journal.state.environments[0]
-    journal.record(events.IsolationFinished(None if removed is None else journal.number(whole - removed)))
+    journal.record(events.IsolationFinished(environment=None if removed is None else journal.number(whole - removed)))
 
 
 def _open(journal: Journal) -> Isolation:
@@ -75,10 +75,21 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
     chosen = exact_runs(state) if journal.whole == state.environments[0] else ()
     number = len(state.isolations) + 1
     first = FIRST_RUN if last is None else last.asked.run + MOST_CHECKS * last.asked.block
-    terms = rule.wanted, rule.rather_than, reduction.keep_rate, ERROR, least
-    size = sum(not gone[one] for one in suspects)
-    block = max(FRESH_RUNS, 2 * least)
-    journal.record(events.IsolationStarted(number, first, block, *terms, tuple(suspects), size, before, chosen))
+    started = events.IsolationStarted(
+        isolation=number,
+        run=first,
+        block=max(FRESH_RUNS, 2 * least),
+        wanted=rule.wanted,
+        rather_than=rule.rather_than,
+        keep_rate=reduction.keep_rate,
+        error=ERROR,
+        at_least=least,
+        suspects=tuple(suspects),
+        size=sum(not gone[one] for one in suspects),
+        before=before,
+        chosen=chosen,
+    )
+    journal.record(started)
 
 
 def _free(journal: Journal) -> Stacks:
@@ -96,8 +107,17 @@ class _Isolator:
         self._whole = journal.state.environments[0]
         now = _open(journal).asked
         rule = Each(now.chosen) if now.chosen else Passing(now.wanted, now.rather_than)
-        terms = rule, now.keep_rate, now.at_least, now.run, now.block
-        self._asked = Asked(self._whole, now.suspects, _free(journal), now.size, *terms)
+        self._asked = Asked(
+            whole=self._whole,
+            suspects=now.suspects,
+            stacks=_free(journal),
+            size=now.size,
+            rule=rule,
+            keep_rate=now.keep_rate,
+            at_least=now.at_least,
+            first_run=now.run,
+            block=now.block,
+        )
 
     def carry_out(self) -> Environment | None:
         """To the end; returns what has to go so that the robot passes. Raises as `Bench.work`, and Stopped."""
@@ -135,7 +155,7 @@ class _Isolator:
         known = (removal.verdict for removal in journal.state.removals if removal.environment == number)
         if next(known, "") != verdict:
             tests = journal.tests(environment, map(self._asked.rule.run, range(runs)), full=True)
-            journal.record(events.RemovalJudged(number, verdict, tests))
+            journal.record(events.RemovalJudged(environment=number, verdict=verdict, tests=tests))
 
     def checked(self, check: Checked) -> None:
         journal = self._journal
@@ -147,12 +167,21 @@ class _Isolator:
             shown = [self.shown(one.environment, run) for run in one.exact or [first + run for run in one.runs]]
             runs = sum(type(each) is bool for each in shown)
             reached = shown.count(True)
-            interval = (reached / max(1, runs),) * 2 if one.exact else anytime_interval(reached, runs)
+            share = reached / max(1, runs)
+            low, high = (share, share) if one.exact else anytime_interval(reached, runs)
             # With the model put back the goal is reached more rarely, but it is not shown to be missed.
             verdict = "not shown" if one.claim.verdict in HELPING else one.claim.verdict
-            claims.append(events.ReturnedMade(one.model, verdict, reached, runs, *interval))
+            claim = events.ReturnedMade(
+                back=one.model,
+                verdict=verdict,
+                reached=reached,
+                runs=runs,
+                low=low,
+                high=high,
+            )
+            claims.append(claim)
         environment = journal.number(self._whole - check.removed)
-        journal.record(events.IsolationChecked(environment, tuple(claims), rests_on))
+        journal.record(events.IsolationChecked(environment=environment, claims=tuple(claims), tests=rests_on))
 
     def _known_checks(self) -> list[Checked]:
         """What fresh runs have shown before this engine."""
@@ -163,6 +192,6 @@ class _Isolator:
             claims = []
             for one in check.claims:
                 model = None if one.back is None else next(iter(journal.models([one.back])))
-                claims.append(NamedClaim(model, passing, Claim(cast(Verdict, one.verdict))))
+                claims.append(NamedClaim(model, passing, Claim(verdict=cast(Verdict, one.verdict))))
             checks.append(Checked(self._whole - passing, tuple(claims)))
         return checks

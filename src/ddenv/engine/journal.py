@@ -117,7 +117,7 @@ class Journal:
             command = self.command
             # A command is not obeyed by that.
             self.command = None
-            self.record(EnvironmentNamed(known, environment))
+            self.record(EnvironmentNamed(environment=known, models=environment))
             self.command = command
         return known
 
@@ -239,7 +239,7 @@ class Journal:
     def lose_running(self) -> None:
         """Records tests that were started and never ended as lost."""
         for test in self.state.running_tests:
-            self.record(TestLost(test.id))
+            self.record(TestLost(test=test.id))
 
     @property
     def current(self) -> Round:

@@ -213,10 +213,22 @@ def fix_failure(
     rate = similar / len(sound)
     broken = sum(test.broke and test.run >= chose for test in tests)
     interval = anytime_interval if len(tests) > usual else wilson_interval
-    shows = len(sound), similar, rate, *interval(similar, len(sound)), failing[f].id, failures[f].position
-    chance = miss_chance(rate, iterations)
-    needed = iterations_needed(rate)
-    return BaselineFinished(*shows, chance, needed, _outcomes(judged), broken, seen=tuple(seen), chose=chose)
+    low, high = interval(similar, len(sound))
+    return BaselineFinished(
+        runs=len(sound),
+        failures=similar,
+        rate=rate,
+        low=low,
+        high=high,
+        failure_test=failing[f].id,
+        position=failures[f].position,
+        miss_chance=miss_chance(rate, iterations),
+        iterations_95=iterations_needed(rate),
+        judged=_outcomes(judged),
+        broken=broken,
+        seen=tuple(seen),
+        chose=chose,
+    )
 
 
 def _outcomes(judged: Mapping[int, Judgement]) -> Outcomes:
@@ -258,7 +270,7 @@ class Sight:
         models = {model.name: model for model in world.models}
         positions = {name: center(models[name]) for name in elements}
         traits = {name: traits_of(models[name]) for name in elements}
-        self._known = Evidence(tuple(elements), positions, traits=traits, delta=delta, seed=seed)
+        self._known = Evidence(elements=tuple(elements), positions=positions, traits=traits, delta=delta, seed=seed)
 
     def evidence(self, journal: Journal, test: int) -> Evidence:
         """The evidence if `test` was the last similar run."""

@@ -96,7 +96,7 @@ def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tupl
     status = "stopped" if stood[0] == "stopped" else "finished"
     environment = journal.number(journal.environment)
     certified = certificate is not None
-    journal.record(events.MarginsStarted(asked, environment, rate, error, budget, certified, status, stood[1]))
+    journal.record(events.MarginsStarted(numbers=asked, environment=environment, rate=rate, error=error, budget=budget, certified=certified, status=status, before=stood[1]))
 
 
 class _Search:
@@ -183,7 +183,7 @@ class _Search:
         try:
             check(*self._parts, self._kept, dict(self._changes(name, value)))
         except NotPossible as error:
-            self._journal.record(events.MarginImpossible(name, value, str(error)))
+            self._journal.record(events.MarginImpossible(name=name, value=value, why=str(error)))
             return True
         return False
 
@@ -195,17 +195,19 @@ class _Search:
         limit = wall_limit(self._journal.state)
         # Fresh runs are full ones, as those of a certificate.
         ends = None if run >= known.FIRST_FIX_RUN or not self._journal.stops_early else ends_of(self._failures)
-        test = Run(self._kept, seed, ends, limit, self._changes(name, value))
+        test = Run(keep=self._kept, seed=seed, ends=ends, limit=limit, changes=self._changes(name, value))
         self._pool.submit(self._submitted, test)
         self._control.started()
 
     def _record(self, one: Wanted, result: Result) -> None:
         data = result_data(result, self._failures)
-        seed = seed_of(self._parts[0].reduction, one[2])
-        kept = {name: data[name] for name in ("outcome", "failure", "distance", "end_pose", "wall_seconds")}
+        name, value, run = one
+        seed = seed_of(self._parts[0].reduction, run)
+        kept = {key: data[key] for key in ("outcome", "failure", "distance", "end_pose", "wall_seconds")}
         # Of each value, the run that can be played beside one of what is left.
-        motions = motions_of(result) if one[2] == self._beside else None
-        self._journal.record(events.MarginRan(*one, seed, **kept), motions, -1 - self._now.made)
+        motions = motions_of(result) if run == self._beside else None
+        ran = events.MarginRan(name=name, value=value, run=run, seed=seed, **kept)
+        self._journal.record(ran, motions, -1 - self._now.made)
         self._broken = self._broken + 1 if data["outcome"] in BROKEN else 0
         if self._broken >= MOST_BROKEN:
             raise UserError(f"{self._broken} runs in a row broke; the last one: {data['failure']}")

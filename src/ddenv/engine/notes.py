@@ -33,7 +33,7 @@ DEAR = 0.3
 def note(journal: Journal, about: str, words: str) -> None:
     """Writes an event with a sentence, unless one `about` the same is there."""
     if about not in dict(journal.state.notes):
-        journal.record(events.Noted(about, words))
+        journal.record(events.Noted(about=about, words=words))
 
 
 def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal) -> None:

@@ -282,7 +282,7 @@ class Pool:
         """The running tests that have begun to move, and how long each took so far, s of real time."""
         running = [(number, slot, slot.job.test, slot.moment) for number, slot in enumerate(self._slots) if slot.job]
         return [
-            (Live(number, test, now.time, now.pose, now.models), slot.clock.look())
+            (Live(slot=number, test=test, time=now.time, pose=now.pose, models=now.models), slot.clock.look())
             for number, slot, test, now in running
             if test is not None and now is not None and all(map(math.isfinite, (now.time, *now.pose)))
         ]

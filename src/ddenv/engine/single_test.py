@@ -125,7 +125,7 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[Dat
     try:
         while shown < len(trials):
             while pool.idle and started < len(trials):
-                pool.submit(started, Run(trials[started].keep, trials[started].seed))
+                pool.submit(started, Run(keep=trials[started].keep, seed=trials[started].seed))
                 started += 1
             for index, result in pool.finished(1.0):
                 trial = trials[index]
@@ -148,7 +148,7 @@ FIRST_RUN = 1_000_000_000
 MOST_BROKEN = 5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Reproduction:
     """What fresh runs showed so far: `shown` of the `runs` that did not break showed f. `fails`: f shows at the rate that the
     certificate expects (True), or at less than half of it (False); None while that is open. `said` has it in words.
@@ -215,6 +215,6 @@ def reproduce(subject: Subject, certificate: Certificate, most: int, jobs: int) 
             shown.append(result["outcome"] == "similar")
         exact = None if all(shown) and len(shown) < len(seeds) else all(shown)
         fails = exact if seeds else shows_at(shown, rate)
-        yield result, Reproduction(fails, sum(shown), len(shown), broken, still_fails(fails, certificate))
+        yield result, Reproduction(fails=fails, shown=sum(shown), runs=len(shown), broken=broken, said=still_fails(fails, certificate))
         if fails is not None or broken > MOST_BROKEN:
             return

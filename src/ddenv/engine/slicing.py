@@ -51,7 +51,7 @@ def slice_environment(journal: Journal) -> bool:
         return False
     audit = audit_is_due(state)
     chose = tuple(test.id for test in tests)
-    journal.record(Sliced(journal.number(left), chose, state.evidence_test, audit))
+    journal.record(Sliced(environment=journal.number(left), tests=chose, evidence_test=state.evidence_test, audit=audit))
     return True
 
 
@@ -63,7 +63,7 @@ def slice_audit(journal: Journal) -> tuple[Wanted, ...]:
         return ()
     environment = journal.environment
     run = state.test(here.evidence_test).run
-    return () if journal.test(environment, run) is not None else (Wanted(environment, run, "audit"),)
+    return () if journal.test(environment, run) is not None else (Wanted(environment=environment, run=run, why="audit"),)
 
 
 def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Environment]]:
@@ -107,7 +107,7 @@ def compare(journal: Journal, audits: Iterable[Test]) -> None:
     if wrong is None or wrong.audits is None or state.refuted is not None:
         return
     sound = takewhile(lambda node: not rests_on_slices(state, node), state.path)
-    journal.record(SlicesRefuted(wrong.id, wrong.audits, [node.number for node in sound][-1]))
+    journal.record(SlicesRefuted(test=wrong.id, by=wrong.audits, node=[node.number for node in sound][-1]))
 
 
 def repeats(journal: Journal, audit: Test) -> bool:

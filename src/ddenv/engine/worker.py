@@ -63,7 +63,7 @@ class Start:
     ties: list[tuple[str, str]] | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Run:
     """Asks for a test. With `ends` it may end early, see `Simulator.run`. `changes` have other values by name. It may take `limit`
     s of real time, without its preparation; None for what the scenario says.

@@ -72,7 +72,7 @@ MOST_EARLIER = 60
 STAKES = {0.3: 0.15, 0.65: 0.25, 0.95: 0.6}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Terms:
     """The share of the whole world's rate that a certificate has to show, the share at which the search aims, the chance of error
     of all claims together, and the minimum number of runs of what is left.
@@ -191,7 +191,7 @@ class Wanted:
 Procedure = Generator[Wanted, tuple[Shown, ...], tuple[Verdict, float | None]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Claim:
     """A verdict, "" while it is open, and the `bound` shown so far, that rest on tests, as (environment, run). `wanted` are the
     tests that it needs next, `later` those that it may need after these. `broken` of its tests broke.
@@ -225,7 +225,15 @@ class Settling:
                 last = wanted.tests[-1][1]
                 later = ((subject, last + more) for more in range(1, ahead) for subject in wanted.later)
                 missing = (tuple(test for test in of if shown(*test) is None) for of in (wanted.tests, later))
-                return Claim("", wanted.bound, tuple(self._tests), self._broken, *missing)
+                now, then = missing
+                return Claim(
+                    verdict="",
+                    bound=wanted.bound,
+                    rests_on=tuple(self._tests),
+                    broken=self._broken,
+                    wanted=now,
+                    later=then,
+                )
             self._tests += wanted.tests
             self._broken += known.count("broken")
             ended: tuple[Verdict, float | None] | None = None
@@ -237,7 +245,13 @@ class Settling:
                 except StopIteration as end:
                     ended = end.value
             if ended is not None:
-                self._settled = Claim(*ended, tuple(self._tests), self._broken)
+                verdict, bound = ended
+                self._settled = Claim(
+                    verdict=verdict,
+                    bound=bound,
+                    rests_on=tuple(self._tests),
+                    broken=self._broken,
+                )
         return self._settled
 
 

@@ -216,7 +216,7 @@ def has_dropped(state: RunState) -> bool:
     return wilson_interval(here.shown, len(here.runs))[1] < least
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FreshRuns:
     """Runs with fresh seeds of the environment of `node`, or of that without the model `without`.
 
@@ -282,14 +282,36 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
         running = tuple(test for test in of if test.outcome == "running")
         claim = claims.get(without) if node == certificate.node else None
         if claim is not None:
-            shows = claim.shown, claim.runs, claim.low, claim.high, claim.outcomes
-            found.append(FreshRuns(node, without, *shows, running, claim, bound=claim.bound))
+            runs_of_claim = FreshRuns(
+                node=node,
+                without=without,
+                shown=claim.shown,
+                runs=claim.runs,
+                low=claim.low,
+                high=claim.high,
+                outcomes=claim.outcomes,
+                running=running,
+                claim=claim,
+                bound=claim.bound,
+            )
+            found.append(runs_of_claim)
             continue
         counts = Counter(test.outcome for test in of if test.is_finished)
         outcomes = tuple((outcome, counts[outcome]) for outcome in OUTCOMES if counts[outcome])
         runs = counts.total() - sum(counts[outcome] for outcome in BROKEN)
         shown = counts["similar"]
-        found.append(FreshRuns(node, without, shown, runs, *anytime_interval(shown, runs), outcomes, running))
+        low, high = anytime_interval(shown, runs)
+        undecided = FreshRuns(
+            node=node,
+            without=without,
+            shown=shown,
+            runs=runs,
+            low=low,
+            high=high,
+            outcomes=outcomes,
+            running=running,
+        )
+        found.append(undecided)
     bounds = {} if claims else {without: claim.bound for without, claim in so_far(state, certificate).items()}
     left_runs, whole_runs = ({test.run for test in tests.get((node, None), [])} for node in (certificate.node, first))
     for place, one in enumerate(found):

@@ -103,5 +103,5 @@ def elsewhere(whole: Sequence[Place], left: Sequence[Place], epsilon: float) -> 
         # By chance no more than `here` of the ends in this group would be of what is left.
         ways = sum(math.comb(len(left), one) * math.comb(len(whole), len(group) - one) for one in range(here + 1))
         if ways / math.comb(len(whole) + len(left), len(group)) <= ERROR / len(found.groups):
-            return EndsElsewhere(found.apart, found.epsilon, there, len(whole), here, len(left))
+            return EndsElsewhere(apart=found.apart, epsilon=found.epsilon, whole=there, of_whole=len(whole), left=here, of_left=len(left))
     return None

@@ -104,15 +104,15 @@ class Known:
     def values(self, rule: Rule) -> list[Value]:
         """All values that were tried, the lowest first."""
         judged = [
-            Value(value, rule.verdict(found), tuple(found), tuple(self.failures.get(value, ())))
+            Value(value=value, verdict=rule.verdict(found), outcomes=tuple(found), failures=tuple(self.failures.get(value, ())))
             for value, found in self.outcomes.items()
             if value not in self.impossible
         ]
-        judged += [Value(value, "impossible", why=why) for value, why in self.impossible.items()]
+        judged += [Value(value=value, verdict="impossible", why=why) for value, why in self.impossible.items()]
         return sorted(judged, key=lambda one: one.value)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Value:
     """A value that was tried, with the outcomes of its runs in their order and how each failed, or `why` it is not possible."""
 
@@ -123,7 +123,7 @@ class Value:
     why: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Side:
     """The values tried above (`up`) or below the present one, the nearest first; `end` is where the range ends.
 
@@ -169,7 +169,7 @@ def _side(asked: NumberAsked, up: bool, tried: Sequence[Value]) -> Side:
     gone = next((at for at, one in enumerate(tried) if one.verdict in ("goal", "other", "impossible")), len(tried))
     shows = [[one for one in part if one.verdict == "f"] for part in (tried[:gone], tried[gone:])]
     until, again = (part[-1] if part else None for part in shows)
-    side = Side(up, tuple(tried), asked.high if up else asked.low, until, None if gone == len(tried) else tried[gone])
+    side = Side(up=up, tried=tuple(tried), end=asked.high if up else asked.low, until=until, gone=None if gone == len(tried) else tried[gone])
     first = next((at for at, one in enumerate(tried) if one.verdict == "goal"), None)
     if first is None:
         return replace(side, again=again)
@@ -200,7 +200,7 @@ def margins_of(margins: Margins) -> tuple[Margin, ...]:
     return tuple(one for one in found if one.up.tried or one.down.tried)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Fix:
     """A changed number with which the robot reaches its goal, by runs of the search; `share` of the number's scale it is changed.
 
@@ -231,7 +231,7 @@ def fixes_of(margins: Margins) -> tuple[Fix, ...]:
         # A run that broke counts against it.
         shown = leans_to(reached, runs - reached, REACHED, REACHED / 2.0, ERROR) is True
         share = abs(value - asked.now) / asked.scale
-        found.append(Fix(asked.name, value, share, reached, runs, shown if runs >= FIX_RUNS else None))
+        found.append(Fix(name=asked.name, value=value, share=share, reached=reached, runs=runs, confirmed=shown if runs >= FIX_RUNS else None))
     return tuple(sorted(found, key=lambda one: (one.share, one.name)))
 
 
@@ -247,7 +247,7 @@ def pairs_of(margins: Margins) -> tuple[NumberAsked, ...]:
     if first is None or second is None or any(fix.confirmed is not False for fix in fixes_of(margins)[:MOST_FIXES]):
         return ()
     parts = tuple((asked.name, asked.now, side.end) for asked, side, _ in (first, second))
-    return (NumberAsked(" & ".join(name for name, *_ in parts), 0.0, 0.0, 100.0, 100.0, 2.0, "%", parts),)
+    return (NumberAsked(name=" & ".join(name for name, *_ in parts), now=0.0, low=0.0, high=100.0, scale=100.0, resolution=2.0, unit="%", together=parts),)
 
 
 def changes_at(asked: NumberAsked, value: float) -> tuple[tuple[str, float], ...]:

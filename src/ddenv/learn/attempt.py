@@ -26,7 +26,7 @@ class RecordedRound:
     tested: Names
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Oracle:
     """`outcomes` of the sets of `models` that do not end `otherwise`; every other set does.
 
@@ -94,7 +94,7 @@ def read_oracle(path: Path) -> Oracle:
         raise UserError(f"{path}: rates: expected numbers from 0 to 1")
     if not frozenset().union(*outcomes, *rates).issubset(models):
         raise UserError(f"{path}: outcomes: a set names a model that is not listed")
-    return Oracle(models, outcomes, otherwise, rates, rounds)
+    return Oracle(models=models, outcomes=outcomes, otherwise=otherwise, rates=rates, rounds=rounds)
 
 
 @dataclass(frozen=True, slots=True)

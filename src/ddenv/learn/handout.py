@@ -39,4 +39,4 @@ def handout(opened: Opened) -> Report:
         Section("Common misconceptions", (Table(("belief", "what is right"), beliefs),)),
     )
     figures = tuple((opened.text(f"{{{name}}}", end), words) for name, words in FIGURES)
-    return Report("ddenv lesson", lesson.title, lead, figures, sections, "Made by ddenv learn.")
+    return Report(name="ddenv lesson", verdict=lesson.title, lead=lead, figures=figures, sections=sections, foot="Made by ddenv learn.")

@@ -38,7 +38,7 @@ class Question:
         return next(place for place, answer in enumerate(self.answers) if answer.right)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
     """A step of a lesson: a Markdown `text`, then maybe a question, something to foretell, or something to do.
 
@@ -55,7 +55,7 @@ class Step:
     line: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Lesson:
     """`name` is its file's, without number and ending; `minutes` is how long it takes. `oracle` is None without one.
 

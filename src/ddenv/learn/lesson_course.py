@@ -27,7 +27,7 @@ DUE = {
 Activity = Literal["try", "race"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
     """A question. Its `key` is for the score; once it is answered, the event `until` is shown, and `then` is asked.
 
@@ -42,7 +42,7 @@ class Asked:
     hint: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Page:
     """What the student reads. `chosen` is the place of the given answer, -1 if it was skipped, None while it is open.
 
@@ -106,8 +106,8 @@ class Course:
         after = blocks(self._after())
         asked = self._asked
         if asked is None:
-            return Page(text, after=after)
-        return Page(text, asked.question, asked.chosen, asked.hint, after)
+            return Page(text=text, after=after)
+        return Page(text=text, question=asked.question, chosen=asked.chosen, hint=asked.hint, after=after)
 
     def _text(self) -> str:
         if self._opened is None:
@@ -150,7 +150,7 @@ class Course:
         if self.is_open or (self.due and self._own is None):
             return False
         if asked is not None and reason is not None:
-            self._asked = Asked(f"{asked.key}.reason", reason)
+            self._asked = Asked(key=f"{asked.key}.reason", question=reason)
         elif self._own is not None:
             self._return()
         elif asked is not None and self._opened is None:
@@ -234,12 +234,12 @@ class Course:
             asked = here.question
             said = self._said
             answers = tuple(replace(each, text=said(each.text), why=said(each.why)) for each in asked.answers)
-            self._asked = Asked(str(step), Question(said(asked.text), answers, said(asked.hint)))
+            self._asked = Asked(key=str(step), question=Question(said(asked.text), answers, said(asked.hint)))
         elif (found := self._opened.foretold[step]) is not None:
-            self._asked = Asked(str(step), found.question, found.until, found.reason)
+            self._asked = Asked(key=str(step), question=found.question, until=found.until, then=found.reason)
         elif here.race:
             self.due = True
-            self._asked = Asked(str(step), bet(self._opened.racers(here)))
+            self._asked = Asked(key=str(step), question=bet(self._opened.racers(here)))
         elif (attempt := self.attempt) is not None:
             self.due = not attempt.ended
 
@@ -312,7 +312,7 @@ class Course:
                 # What was explained a moment ago is not asked again.
                 shown = replace(found, reason=None) if found.kind in self._explained else found
                 self._explained |= {found.kind}
-                self._asked = Asked(f"free.{id}", shown.question, shown.until, shown.reason)
+                self._asked = Asked(key=f"free.{id}", question=shown.question, until=shown.until, then=shown.reason)
                 if self._opened is not None:
                     self._own = self._own or before
                 return True

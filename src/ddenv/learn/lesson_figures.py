@@ -56,7 +56,9 @@ def _fresh_whole(state: RunState) -> str:
         return "no fresh run"
     shown = outcomes.count("similar")
     runs = len(outcomes)
-    return claims.rate(Claim(None, "", shown, runs, *anytime_interval(shown, runs)))
+    low, high = anytime_interval(shown, runs)
+    claim = Claim(without=None, verdict="", shown=shown, runs=runs, low=low, high=high)
+    return claims.rate(claim)
 
 
 def _now(state: RunState) -> Certificate:

@@ -27,7 +27,7 @@ NAMED = 5
 BOUND = "The last line: no search can be sure to find such a set with fewer yes-or-no answers."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Turn:
     """A test of `candidate` in round `round`, which ended with `outcome`; `left` are the models that are kept after it.
 
@@ -45,7 +45,7 @@ class Turn:
         return self.candidate.split if isinstance(self.candidate, Candidate) else None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Play:
     """The tests of one search: it begins with the models `begins`. `ended` says whether it came to its end."""
 
@@ -78,9 +78,9 @@ def recorded_play(name: str, oracle: Oracle) -> Play:
     for number, round in enumerate(oracle.rounds[name], 1):
         if sorted(model for part in round.parts for model in part) != sorted(environment) or not round.tested:
             raise UserError(f"plays: {name}: round {number}: its parts do not make up the models that were left")
-        split = Split(environment, round.parts)
+        split = Split(environment=environment, partitions=round.parts)
         kinds = (("partition", 0), ("complement", 1))
-        made = (Candidate(2 * at + odd, kind, at, split) for at in range(len(split.partitions)) for kind, odd in kinds)
+        made = (Candidate(index=2 * at + odd, kind=kind, partition=at, split=split) for at in range(len(split.partitions)) for kind, odd in kinds)
         candidates = {one.label: one for one in made}
         for label in round.tested:
             if label not in candidates or (turns and turns[-1].round == number and turns[-1].outcome == "similar"):
@@ -90,8 +90,8 @@ def recorded_play(name: str, oracle: Oracle) -> Play:
             if outcome == "similar":
                 there = frozenset(one.models)
                 environment = tuple(model for model in environment if model in there)
-            turns.append(Turn(one, number, outcome, environment))
-    return Play(name, oracle.models, tuple(turns))
+            turns.append(Turn(candidate=one, round=number, outcome=outcome, left=environment))
+    return Play(name=name, begins=oracle.models, turns=tuple(turns))
 
 
 # From run files.
@@ -127,7 +127,7 @@ def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
         elif isinstance(event, TestFinished) and event.test in begun:
             test = state.test(event.test)
             (candidate, again) = begun[event.test]
-            turns.append(Turn(candidate, test.round or 0, test.outcome, state.environment, again))
+            turns.append(Turn(candidate=candidate, round=test.round or 0, outcome=test.outcome, left=state.environment, again=again))
         elif turns and state.environment is not turns[-1].left:
             turns[-1] = replace(turns[-1], left=state.environment)
     if not turns:
@@ -137,7 +137,7 @@ def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
     chosen = settings(state)
     parts = dict(zip(BOTH, chosen.pair.partition("/")[::2], strict=True))
     method = f"{chosen.algorithm} {'/'.join(parts[each] for each in uses(chosen.algorithm))}".strip()
-    return Play(run.stem, state.elements, tuple(turns), ended, method)
+    return Play(name=run.stem, begins=state.elements, turns=tuple(turns), ended=ended, method=method)
 
 
 def spent(play: Play, tests: int | None = None) -> dict[str, int]:

@@ -62,14 +62,14 @@ def read_lesson(file: Path, places: Callable[[Path], Find]) -> Lesson:
     oracle = _beside(top["oracle"]) if "oracle" in top else None
     found = top["run"].tried(lambda: places(run))
     return Lesson(
-        file,
-        top["title"].words(),
-        top["aim"].words(),
-        top["minutes"].whole() if "minutes" in top else 10,
-        run,
-        oracle,
-        tuple(_step(each, found, oracle is not None) for each in top["steps"].entries()),
-        _others(top["beside"]) if "beside" in top else {},
+        file=file,
+        title=top["title"].words(),
+        aim=top["aim"].words(),
+        minutes=top["minutes"].whole() if "minutes" in top else 10,
+        run=run,
+        oracle=oracle,
+        steps=tuple(_step(each, found, oracle is not None) for each in top["steps"].entries()),
+        beside=_others(top["beside"]) if "beside" in top else {},
     )
 
 
@@ -181,13 +181,13 @@ def _step(node: _Node, find: Find, has_oracle: bool) -> Step:
         if not at.raw().startswith(wanted):
             raise at.wrong(f"to foretell the {foretell} it must be a {wanted}")
     return Step(
-        keys["text"].words(),
-        None if at is None else int(at.tried(lambda: find(at.raw()))),
-        _question(node, keys) if "ask" in keys else None,
-        foretell,
-        keys["try"].keys(("budget",), "budget")["budget"].whole() if "try" in keys else None,
-        _racers(keys["race"]) if "race" in keys else (),
-        node.line,
+        text=keys["text"].words(),
+        at=None if at is None else int(at.tried(lambda: find(at.raw()))),
+        question=_question(node, keys) if "ask" in keys else None,
+        foretell=foretell,
+        budget=keys["try"].keys(("budget",), "budget")["budget"].whole() if "try" in keys else None,
+        race=_racers(keys["race"]) if "race" in keys else (),
+        line=node.line,
     )
 
 
@@ -249,9 +249,9 @@ class Places:
                 found.setdefault(("start", 0), id)
             case BaselineFinished():
                 found["baseline", 0] = id
-            case TestStarted(test):
+            case TestStarted(test=test):
                 found["test", test] = id
-            case TestFinished(test) | Implied(test):
+            case TestFinished(test=test) | Implied(test=test):
                 self._ended = test
                 found["result", test] = id
                 # One that follows from another test never started.

@@ -16,7 +16,7 @@ from ddenv.text import Names
 MOST_MOVES = 2000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
     """`step` is where the student is. `answered` has for each question, by a key such as "3.reason", whether it was right.
 

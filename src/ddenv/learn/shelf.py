@@ -40,7 +40,7 @@ def find_lesson(name: str) -> Path | None:
     return path if path.suffix.lower() in (".yaml", ".yml") and path.is_file() else None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Opened:
     """A lesson with the position in its run, its oracle if it has one, and the ends of the runs beside it."""
 
@@ -117,7 +117,7 @@ def open_lesson(file: Path) -> Opened:
     for name, run in lesson.beside.items():
         with RunFile(run) as content:
             beside[name] = fold(content.events())
-    made = Opened(lesson, opened[0], oracle, beside, plays)
+    made = Opened(lesson=lesson, position=opened[0], oracle=oracle, beside=beside, plays=plays)
     _check(made)
     return made
 

@@ -35,7 +35,7 @@ MOST_COVERED = 0.3  # maximum fraction of a name that may cover other models
 LARGE = 10.0  # a model at least this many times larger than a name may carry the name of another model
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
     """The rectangle from `low` to `high`, m, drawn with `scale` pixels per m at `left` and `top` on the page, pixels."""
 
@@ -67,7 +67,8 @@ class Frame:
         scale = float(min(most / (high - low)))
         sides = np.maximum(high - low, np.array(room) / scale)
         center = (low + high) / 2
-        return cls(center - sides / 2, center + sides / 2, scale, *at)
+        left, top = at
+        return cls(low=center - sides / 2, high=center + sides / 2, scale=scale, left=left, top=top)
 
     @property
     def box(self) -> np.ndarray:

@@ -116,7 +116,7 @@ def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
     return float(np.linalg.norm(away - np.clip(along, 0.0, 1.0)[:, None] * sides, axis=1).min())
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Drawn:
     """A model to draw from above. `center` and `size` are of the box around it, m.
 
@@ -153,7 +153,7 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
             center = vector((box[0] + box[1]) / 2)
             size = vector(box[1] - box[0])
         floor = len(models) > 2 and outline.area > limit and not outline.hollow
-        drawn.append(Drawn(model, outline, center, size, _color(model), floor))
+        drawn.append(Drawn(model=model, outline=outline, center=center, size=size, color=_color(model), floor=floor))
     return tuple(sorted(drawn, key=_turn))
 
 

@@ -33,7 +33,7 @@ COARSEST = 1e6
 MOST_PIXELS = 2_000_000  # painted at a time
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class View:
     """The part of the world on a map of `columns` x `rows` cells: its centre `x`, `y` in m, and `scale` in m per pixel."""
 
@@ -69,11 +69,11 @@ class View:
         scale = min(COARSEST, max(FINEST, self.scale / factor))
         x, y = about or (self.x, self.y)
         part = scale / self.scale
-        return View(x + (self.x - x) * part, y + (self.y - y) * part, scale, self.columns, self.rows)
+        return View(x=x + (self.x - x) * part, y=y + (self.y - y) * part, scale=scale, columns=self.columns, rows=self.rows)
 
     def around(self, x: float, y: float) -> View:
         """The view at the same scale, centred on (x, y) m."""
-        return View(x, y, self.scale, self.columns, self.rows)
+        return View(x=x, y=y, scale=self.scale, columns=self.columns, rows=self.rows)
 
     def panned(self, columns: float, rows: float) -> View:
         """The view moved by `columns` to the right and `rows` upwards."""
@@ -92,7 +92,7 @@ def fit(
     low = low - margin
     high = high + margin
     scale = max((high[0] - low[0]) / max(1, columns), (high[1] - low[1]) / max(1, 2 * rows), FINEST)
-    return View(float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2, float(scale), columns, rows)
+    return View(x=float(low[0] + high[0]) / 2, y=float(low[1] + high[1]) / 2, scale=float(scale), columns=columns, rows=rows)
 
 
 def extent(prints: Sequence[Footprint], points: Iterable[Point]) -> tuple[np.ndarray, np.ndarray]:
@@ -120,7 +120,7 @@ def extent(prints: Sequence[Footprint], points: Iterable[Point]) -> tuple[np.nda
     return low, high
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Outlines:
     """The polygons of all models in flat arrays: polygon p has `counts[p]` of the `corners` (M, 2) m, from `first[p]` on.
 
@@ -167,15 +167,15 @@ def pack(prints: Sequence[Footprint]) -> Outlines:
         areas = np.abs(np.add.reduceat(here[:, 0] * ahead[:, 1] - here[:, 1] * ahead[:, 0], first)) / 2
         lengths = np.hypot(*(high - low).T)
     return Outlines(
-        corners,
-        first,
-        counts,
-        np.array([index for index, _ in polygons], dtype=np.intp),
-        (low + high) / 2,
-        lengths,
-        areas / np.maximum(lengths, 1e-12),
-        np.array([each.center for each in prints]).reshape(-1, 2),
-        np.array([not each.polygons for each in prints], dtype=bool),
+        corners=corners,
+        first=first,
+        counts=counts,
+        models=np.array([index for index, _ in polygons], dtype=np.intp),
+        middles=(low + high) / 2,
+        lengths=lengths,
+        widths=areas / np.maximum(lengths, 1e-12),
+        centers=np.array([each.center for each in prints]).reshape(-1, 2),
+        bare=np.array([not each.polygons for each in prints], dtype=bool),
     )
 
 

@@ -76,7 +76,7 @@ class Section:
     blocks: tuple[Block, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
     """A whole report: its name, the result in a few words, `figures` (number, what it counts), and its sections."""
 

@@ -51,7 +51,7 @@ class Trial:
         return frozenset(self.environment.names(self.elements))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Evidence:
     """What is known about the world, about the last similar run in the current environment, and from all tests so far.
 

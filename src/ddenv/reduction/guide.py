@@ -23,7 +23,7 @@ UNIFORM = 0.1
 _ARGUMENTS = {"trajectory": "a trajectory", "failure_position": "a failure_pose"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Guide:
     """What an algorithm asks while it searches. Models are numbers, in the order of the world file.
 
@@ -87,7 +87,7 @@ def make_guide(
             return np.full(len(names), UNIFORM)
         return spatial_prior(names, known)
 
-    return Guide(split_now, rank_now, chances_now, **more)
+    return Guide(split=split_now, rank=rank_now, chances=chances_now, **more)
 
 
 def search(algorithm: str, elements: Iterable[int], guide: Guide) -> Search:

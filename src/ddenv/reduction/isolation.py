@@ -96,7 +96,7 @@ class Checked:
         return self.claims[0].claim.verdict == "passes"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Asked:
     """An isolation: of `whole`, the suspects may go, at first `size` of them; `stacks` has what goes with each. Each check has the
     error of its number, and begins `block` runs after the one before.
@@ -176,7 +176,7 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Wor
             shown = {run: driver.shown(with_it, run, full=True) for run in rule.exact}
             known = tuple(run for run, one in shown.items() if one is not None)
             missed = False in shown.values()
-            claim = Claim("needed" if missed else "not needed" if known == rule.exact else "not shown")
+            claim = Claim(verdict="needed" if missed else "not needed" if known == rule.exact else "not shown")
             named.append(NamedClaim(model, with_it, claim, known))
         return Checked(removed, tuple(named))
     certain = replace(rule, error=error)
@@ -204,8 +204,8 @@ def isolating(suspects: Partition, first: int) -> Search:
         whole = Environment.of(suspects)
         models = Environment.of(group)
         # Its one candidate may be all suspects.
-        candidate = Candidate("partition", 0, group, models, whole - models)
-        winner = yield Round(1, suspects, (group,), (0.0,), (candidate,))
+        candidate = Candidate(kind="partition", partition=0, part=group, models=models, lacks=whole - models)
+        winner = yield Round(n_partitions=1, environment=suspects, partitions=(group,), scores=(0.0,), candidates=(candidate,))
         if winner is not None:
             return (yield from ddmin(group))
         if size >= len(suspects):

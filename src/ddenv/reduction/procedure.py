@@ -57,7 +57,7 @@ ENOUGH_BLOCKS = 20
 Result = TypeVar("Result", covariant=True)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Test:
     """Run number `run` of an environment. With `full` it runs to its end, whatever its purpose.
 
@@ -95,7 +95,7 @@ class Past:
     winner: int | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Leg:
     """Where a search begins: `chain` leads to the environment that is searched, from the first one to which it may go back. What is
     left has to keep the rate of f in `whole`.
@@ -266,7 +266,7 @@ def baseline(
     runs = min(usual, enough_alike or usual)
     while True:
         while missing := [run for run in range(runs) if driver.shown(whole, run) is None]:
-            yield tuple(Test(whole, run, "baseline") for run in missing)
+            yield tuple(Test(environment=whole, run=run, why="baseline") for run in missing)
         found = driver.baseline_ran(runs, chose)
         if runs < usual and not (found and found.alike):
             runs = usual
@@ -356,7 +356,7 @@ def judge(
             judged += 1
         if not wanted:
             return None
-        yield tuple(Test(environments[index], run, why, index, full=in_full) for index, run in wanted)
+        yield tuple(Test(environment=environments[index], run=run, why=why, candidate=index, full=in_full) for index, run in wanted)
 
 
 def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Certified]:
@@ -364,7 +364,7 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
     left = chain[-1]
     whole = leg.whole
     while missing := [run for run in leg.rule.exact if driver.shown(left, run) is None]:
-        yield tuple(Test(left, run, "round") for run in missing)
+        yield tuple(Test(environment=left, run=run, why="round") for run in missing)
     certificate = driver.certificate_due()
     rests = {model: left - stack for model, stack in leg.free.items() if stack <= left}
     fresh = _fresh(driver, certificate.first_run)
@@ -384,7 +384,7 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
         for model, rest in rests.items():
             shown = [driver.shown(rest, run) for run in certificate.exact]
             open_verdict: Verdict = "unknown" if "broken" in shown else "not shown" if None in shown else "needed"
-            claim = Claim("not needed" if True in shown else open_verdict)
+            claim = Claim(verdict="not needed" if True in shown else open_verdict)
             made = (*made, NamedClaim(model, rest, claim, certificate.exact))
     certified = Certified(certificate, made)
     driver.certified(certified)
@@ -451,7 +451,7 @@ def settled(
         later = zip_longest(*(one.claim.later for one in named))
         without = {one.environment: one.model for one in reversed(named)}
         wants = dict.fromkeys(
-            Test(environment, first_run + run, why, without=without.get(environment))
+            Test(environment=environment, run=first_run + run, why=why, without=without.get(environment))
             for tests in (*next_ones, *later)
             for environment, run in filter(None, tests)
         )
@@ -518,7 +518,7 @@ def _settled_in_blocks(
         block = min(run for _, run in wanted)
         order = _in_drawn_order((test for test in wanted if test[1] == block), terms.order_seed)
         made += 1
-        yield tuple(Test(one, first_run + run, "certify", without=without.get(one)) for one, run in order)
+        yield tuple(Test(environment=one, run=first_run + run, why="certify", without=without.get(one)) for one, run in order)
 
 
 def _fresh(driver: Runs, first_run: int) -> ShownIn:
@@ -593,7 +593,7 @@ def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certifie
         return claims[environment]
 
     while not isinstance(place := last_good(chain, judged), int):
-        yield tuple(Test(environment, first + run, "certify") for environment, run in place)
+        yield tuple(Test(environment=environment, run=first + run, why="certify") for environment, run in place)
     again = tuple(groups_again(chain[place], chain[place + 1], chain[-1]))
     tests = tuple((environment, first + run) for claim in claims.values() for environment, run in claim.rests_on)
     return driver.stepped_back(place, again, tests)

@@ -72,7 +72,7 @@ class NamedRound:
     candidates: tuple[tuple[str, int], ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RateClaim:
     """A claim about what is left, or, if `without` is an element, about that without it.
 
@@ -93,7 +93,7 @@ class RateClaim:
     bound: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Reduction:
     """What `reduce` returns: the elements `kept`, in their order, after `tests` calls of the test in `rounds` rounds.
 
@@ -197,7 +197,7 @@ def reduce(
     times = _each("first_sensed", first_sensed, None, "a time in s", _time)
     felt = None if touched is None else frozenset(touched)
     alike = _each("traits", traits, names, "ddenv.Traits", lambda value: value if isinstance(value, Traits) else None)
-    known = Evidence(names, places, path, failure, times, felt, alike, delta=float(delta), seed=int(seed))
+    known = Evidence(elements=names, positions=places, trajectory=path, failure_position=failure, first_sensed=times, touched=felt, traits=alike, delta=float(delta), seed=int(seed))
 
     def begin(leg: steps.Leg) -> Search:
         guide = make_guide(
@@ -255,7 +255,7 @@ def reduce(
     )
 
 
-@dataclass
+@dataclass(kw_only=True)
 class _Caller:
     """Drives the procedure: calls `test` for each test that it wants. With `keep_rate` 0 the first run with the failure decides.
     `calls` counts them by what they were made for.
@@ -356,13 +356,13 @@ class _Caller:
         the end; else None.
         """
         if check:
-            self.carry_out((steps.Test(self.whole, run, "baseline"),) for run in range(REPLAYS))
+            self.carry_out((steps.Test(environment=self.whole, run=run, why="baseline"),) for run in range(REPLAYS))
             if not all(self._of_whole):
                 return None
         alone = self.search_once()
-        replays = [steps.Test(self.left, run, "certify") for run in range(1, 1 + REPLAYS)]
+        replays = [steps.Test(environment=self.left, run=run, why="certify") for run in range(1, 1 + REPLAYS)]
         tested = (rest for rest in self._removals() if self.shown(rest, 0) is not None)
-        replays += [steps.Test(rest, 1, "certify") for rest in tested]
+        replays += [steps.Test(environment=rest, run=1, why="certify") for rest in tested]
         self.carry_out((test,) for test in replays)
         return None if self.flaky else alone
 
@@ -409,10 +409,10 @@ class _Caller:
         rate = self.rate() if self.keep_rate else 0.0
         # While calls are left it goes back, however often.
         steps_back = min(len(self._lost), steps.MOST_STEPS_BACK - 1)
-        rule = Acceptance(1 + self.iterations, rate, self.keep_rate, steps_back)
+        rule = Acceptance(most_misses=1 + self.iterations, rate=rate, keep_rate=self.keep_rate, steps_back=steps_back)
         free = {element: Environment.of((element,)) for element in self.left}
         n_partitions = self._n_partitions.get(self.left)
-        return steps.Leg(self.rounds + 1, self.whole, self._chain, NOTHING, free, rule, n_partitions, again)
+        return steps.Leg(first_round=self.rounds + 1, whole=self.whole, chain=self._chain, pinned=NOTHING, free=free, rule=rule, n_partitions=n_partitions, again=again)
 
     def round_began(self, number: int, round: Round) -> None:
         self.rounds += 1
@@ -462,8 +462,17 @@ class _Caller:
             shown = sum(self._known[named.environment, made.certificate.first_run + run] for run in named.runs)
             without = None if named.model is None else self.names[named.model]
             claim = named.claim
-            interval = anytime_interval(shown, len(named.runs))
-            claims.append(RateClaim(without, claim.verdict, shown, len(named.runs), *interval, claim.bound))
+            low, high = anytime_interval(shown, len(named.runs))
+            rate_claim = RateClaim(
+                without=without,
+                verdict=claim.verdict,
+                shown=shown,
+                runs=len(named.runs),
+                low=low,
+                high=high,
+                bound=claim.bound,
+            )
+            claims.append(rate_claim)
         self.claims = tuple(claims)
         if claims[0].verdict != "lost":
             self._shown[self.left] = self.claims

@@ -13,7 +13,7 @@ from ddenv.environment import NOTHING, Environment
 Partition = tuple[int, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Candidate:
     """A sub-environment to try: "partition" or "complement" of the round's partition number `partition`, which is `part`. `models`
     are there, `lacks` are those of the environment that are not.
@@ -26,7 +26,7 @@ class Candidate:
     lacks: Environment
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Round:
     """`partitions` in the order in which they are tried, with the `scores` that rank them. The first similar candidate wins.
 
@@ -95,8 +95,8 @@ def round_of(
         if models in seen or not lacks or (not models and len(environment) > 1):
             continue
         seen.add(models)
-        candidates.append(Candidate(kind, number, partitions[number], models, lacks))
-    return Round(n_partitions, environment, tuple(partitions), tuple(scores), tuple(candidates))
+        candidates.append(Candidate(kind=kind, partition=number, part=partitions[number], models=models, lacks=lacks))
+    return Round(n_partitions=n_partitions, environment=environment, partitions=tuple(partitions), scores=tuple(scores), candidates=tuple(candidates))
 
 
 def in_order(environment: Partition, partitions: Sequence[Partition], *kinds: str) -> Round:

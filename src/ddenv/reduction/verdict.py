@@ -37,7 +37,7 @@ class Rule(Protocol):
         """Whether a candidate stays open after `broken` of its first `runs` runs broke; else it is unknown."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Acceptance:
     """The rule of a search. A candidate is dissimilar after `most_misses` runs without f and none with it.
 

@@ -29,7 +29,7 @@ T = TypeVar("T")
 CORNERS = 32
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
     """A run: its `state`, its `rounds` as they ended, its first settings, and its scenario and world if they can be read.
 

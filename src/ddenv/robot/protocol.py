@@ -92,7 +92,7 @@ class Reading(NamedTuple):
     scan: Scan | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
     """What a controller knows before the run starts.
 

@@ -18,7 +18,7 @@ PoseRow = tuple[float, float, float, float, float, float, float]
 Progress = Callable[[float, PoseRow, Mapping[str, PoseRow]], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RunResult:
     """One run of the robot.
 

@@ -16,7 +16,7 @@ UNREST = 0.05
 MOST_NAMES = 3  # a line names so many models
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Settled:
     """What the models that can move do in `seconds` of simulated time while nobody comes near them.
 

@@ -21,12 +21,12 @@ Outcome = Annotated[str, OneOf("similar", "other", "pass", "error", "timeout", "
 Verdict = Annotated[str, OneOf("similar", "dissimilar", "unknown")]
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 class Event:
     """Every event is one of these, and so a frozen dataclass."""
 
     def __init_subclass__(cls) -> None:
-        dataclass(frozen=True)(cls)
+        dataclass(frozen=True, kw_only=True)(cls)
 
 
 # The engine.
@@ -151,8 +151,8 @@ class EnvironmentNamed(Event):
 # Tests.
 
 
-@dataclass(frozen=True, slots=True)
-class Start:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TestStart:
     """Run number `run` of an environment, with a seed of its own. `phase` says what for: the baseline, a `candidate` of a round,
     the user's `trial` ("hand"), an audit of a slice, a certificate ("certify": with a fresh seed, `without` a model if it is given)
     or an isolation.
@@ -169,16 +169,16 @@ class Start:
     without: Natural | None = None
 
 
-class TestStarted(Start, Event):
+class TestStarted(TestStart, Event):
     """A test starts. It `audits` the test that implies it."""
 
     audits: Number | None = None
 
 
-class Implied(Start, Event):
+class Implied(TestStart, Event):
     """A test starts and ends at once: the result is that of the test `by`, which has its trajectories."""
 
-    by: Number = field(kw_only=True)
+    by: Number
 
 
 class TestFinished(Event):
@@ -391,7 +391,7 @@ class CertificateStarted(Event):
     seeds: tuple[Natural, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ClaimMade:
     """A claim about an environment: about what is left, or, if `without` is a model, about that without it.
 
@@ -413,7 +413,7 @@ class ClaimMade:
     bound: Share | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class EndsElsewhere:
     """Of the ends of f, `whole` of `of_whole` in the baseline are in a group, and `left` of `of_left` fresh ones of what is left.
     Other groups are `apart` from it, m; an `epsilon` that tells them apart, m.
@@ -488,7 +488,7 @@ class RemovalJudged(Event):
     tests: tuple[Number, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ReturnedMade:
     """A claim of a check: about a world that passes, or, if `back` is a model, about that with it put back."""
 
@@ -521,7 +521,7 @@ class IsolationGivenUp(Event):
 # Margins.
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NumberAsked:
     """A number of the world or of the scenario, such as "barrel_02.y": its value `now`, and the `low`est and `high`est to try. A
     change is measured as a share of `scale`; less than `resolution` does not matter. All are in `unit`, "" for a plain number.

@@ -20,7 +20,7 @@ from ddenv.runfile.state import RunState
 CHUNK = 400
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OtherFailure:
     """A failure f' that `tests` showed, in order. `position` (x, y, z m) is the end in their middle.
 
@@ -54,7 +54,7 @@ def atlas(state: RunState) -> tuple[OtherFailure, ...]:
         for position, tests in _by_end(ends, epsilon):
             sizes = {test: len(state.environments[state.test(test).environment]) for test in tests}
             smallest = min(tests, key=lambda test: (sizes[test], test))
-            found.append(OtherFailure(kind, position, tuple(sorted(tests)), smallest, sizes[smallest]))
+            found.append(OtherFailure(kind=kind, position=position, tests=tuple(sorted(tests)), smallest=smallest, size=sizes[smallest]))
     return tuple(sorted(found, key=lambda one: (-len(one.tests), one.tests)))
 
 

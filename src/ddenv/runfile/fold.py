@@ -80,7 +80,7 @@ def created(state: RunState, event: e.Created, _: float) -> Changes:
         "environments": PersistentTuple.of([Environment.whole(len(names))]),
         "environment": names,
         "history": (Point(0, len(names)),),
-        "nodes": (Node(0, None, "start", "the whole world", names),),
+        "nodes": (Node(number=0, parent=None, how="start", what="the whole world", environment=names),),
     }
 
 
@@ -211,13 +211,13 @@ def round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
     letters = tuple(had[part] if part in had else next(free) for part in parts)
     names = tuple(tuple(map(state.elements.__getitem__, part)) for part in event.partitions)
     always = event.pinned.names(state.elements)
-    split = Split(whole.names(state.elements), names, always, whole, parts, event.pinned, letters)
+    split = Split(environment=whole.names(state.elements), partitions=names, pinned=always, whole=whole, parts=parts, always=event.pinned, letters=letters)
     candidates = PersistentTuple.of(
-        Candidate(index, kind, partition, split, distance)
+        Candidate(index=index, kind=kind, partition=partition, split=split, distance=distance)
         for index, (kind, partition, distance) in enumerate(event.candidates)
     )
     here = replace(state.nodes[state.node], n_partitions=event.n_partitions)
-    round = Round(event.round, event.n_partitions, split, candidates)
+    round = Round(number=event.round, n_partitions=event.n_partitions, split=split, candidates=candidates)
     return {**waits_no_more(state), "round": round, "nodes": with_node(state.nodes, here)}
 
 
@@ -289,7 +289,7 @@ def round_finished(state: RunState, event: e.RoundFinished, _: float) -> Changes
         judged = [one for one in round.candidates[:last] if one.verdict in JUDGED]
         tests = tuple(dict.fromkeys(test for one in judged for test in one.tests))
         unknown = tuple(one.index for one in judged if one.verdict == "unknown")
-        past = PastRound(digest(round.split.parts), round.winner, evidence, tests, unknown)
+        past = PastRound(digest=digest(round.split.parts), winner=round.winner, evidence_test=evidence, tests=tests, unknown=unknown)
         changes["leg"] = replace(state.leg, past=(*state.leg.past, past))
     return changes
 

@@ -82,7 +82,7 @@ def isolation_started(state: RunState, event: e.IsolationStarted, _: float) -> C
         raise ValueError(event.isolation)
     if max(event.suspects, default=0) >= len(state.elements):
         raise ValueError("suspects")
-    return {"isolations": (*without_open(state), Isolation(event))}
+    return {"isolations": (*without_open(state), Isolation(asked=event))}
 
 
 def removal_judged(state: RunState, event: e.RemovalJudged, _: float) -> Changes:
@@ -134,7 +134,7 @@ def margins_started(state: RunState, event: e.MarginsStarted, _: float) -> Chang
     asked = tuple(NumberTried(one, event.rate, event.error) for one in event.numbers)
     last = state.margins
     if last is None or last.asked.environment != event.environment:
-        return {"margins": Margins(event, asked, earlier=0 if last is None else last.made)}
+        return {"margins": Margins(asked=event, numbers=asked, earlier=0 if last is None else last.made)}
     numbers = (*(one for one in last.numbers if one.asked.name not in names), *asked)
     now = replace(last, asked=event, numbers=numbers, before_call=len(last.runs), ended=False, broken_off=False)
     return {"margins": now}

@@ -45,7 +45,7 @@ def unpinned(state: RunState, event: e.Unpinned, at: float) -> Changes:
 
 def trial_started(state: RunState, event: e.TrialStarted, at: float) -> Changes:
     names = state.environments[event.environment].names(state.elements)
-    trial = Trial(event.trial, names, state.node, event.environment)
+    trial = Trial(number=event.trial, models=names, node=state.node, environment=event.environment)
     if trial.number != len(state.trials) + 1:
         raise ValueError(trial.number)
     inside = frozenset(names)
@@ -174,9 +174,18 @@ def leg_started(state: RunState, event: e.LegStarted, _: float) -> Changes:
     """A search starts from the current environment."""
     if state.evidence_test is None:
         raise ValueError("f is not known")
-    start = event.round, state.node, event.n_partitions, state.pinned, state.evidence_test, state.scenario["reduction"]
-    tests = tuple(test for test in state.judged if state.test(test).is_finished)
-    leg = Leg(*start, event.rate, state.steps_back, tests, state.again)
+    leg = Leg(
+        first_round=event.round,
+        node=state.node,
+        n_partitions=event.n_partitions,
+        pinned=state.pinned,
+        evidence_test=state.evidence_test,
+        settings=state.scenario["reduction"],
+        rate=event.rate,
+        steps_back=state.steps_back,
+        tests=tuple(test for test in state.judged if state.test(test).is_finished),
+        again=state.again,
+    )
     return {**searched_anew(state), "search_due": False, "forecast": None, "leg": leg, "again": ()}
 
 
@@ -234,7 +243,7 @@ def at_node(state: RunState, node: Node, needed: int = 0) -> Changes:
 
 def decision(state: RunState, at: float, kind: str, words: str) -> Changes:
     """One more decision of the user."""
-    return {"decisions": (*state.decisions, Decision(at, state.tests_done, state.node, kind, words))}
+    return {"decisions": (*state.decisions, Decision(time=at, tests=state.tests_done, node=state.node, kind=kind, words=words))}
 
 
 def refused(state: RunState, environment: Environment, verdict: str, round: int | None) -> Changes:

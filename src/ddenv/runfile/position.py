@@ -14,6 +14,7 @@ from ddenv.runfile.store import Recorded
 
 # What a step goes to: the next event that a viewer sees; the end of the next chapter; the next reduction; the next verdict or
 # decision of the user.
+ChapterKind = Literal["baseline", "round", "certificate"]
 Step = Literal["moment", "round", "reduction", "decision"]
 # A state is kept of one in so many events.
 GAP = 256
@@ -30,13 +31,13 @@ _UNSEEN = {
 _VERDICTS = ("candidate_judged", "trial_judged", "certificate_finished")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Chapter:
     """The baseline, a round or a certificate: `kind` with its `number`. It has events from `first` to `last`, begins with `models`
     and ends with `left` of them. `tests` were finished when it began.
     """
 
-    kind: Literal["baseline", "round", "certificate"]
+    kind: ChapterKind
     number: int
     first: int
     last: int
@@ -100,18 +101,28 @@ class Position:
             self.note(event.kind, before, after)
 
     def _add_to_chapter(self, kind: str, before: RunState, after: RunState) -> None:
-        id = after.revision
-        models = len(after.environment)
         last = self.chapters[-1] if self.chapters else None
-        begun = id, id, models, models, after.tests_done
         if kind == "round_started" and after.round is not None:
-            self.chapters.append(Chapter("round", after.round.number, *begun))
+            self._begin_chapter("round", after.round.number, after)
         elif kind == "certificate_started":
-            self.chapters.append(Chapter("certificate", after.certificates[-1].number, *begun))
+            self._begin_chapter("certificate", after.certificates[-1].number, after)
         elif last is None:
-            self.chapters.append(Chapter("baseline", 0, *begun))
+            self._begin_chapter("baseline", 0, after)
         elif kind not in _UNSEEN and _goes_on(last, after):
-            self.chapters[-1] = replace(last, last=id, left=models)
+            self.chapters[-1] = replace(last, last=after.revision, left=len(after.environment))
+
+    def _begin_chapter(self, kind: ChapterKind, number: int, state: RunState) -> None:
+        models = len(state.environment)
+        chapter = Chapter(
+            kind=kind,
+            number=number,
+            first=state.revision,
+            last=state.revision,
+            models=models,
+            left=models,
+            tests=state.tests_done,
+        )
+        self.chapters.append(chapter)
 
     @property
     def now(self) -> RunState:

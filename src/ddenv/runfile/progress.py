@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ddenv.runfile import events as e
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Leg:
     """The start of a search: the number of its first round, the node that it starts from, and what was known then. `n_partitions`
     is None for the scenario's value. `tests` are those that verdicts rested on, for schemas that learn. A candidate has to keep the
@@ -36,7 +36,7 @@ class Leg:
     past: tuple[PastRound, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PastRound:
     """A round of the current search that is over: a `digest` of its partitions, its winner, and the tests of its verdicts.
     `evidence_test` is the run of the winner that guides the next rounds; tests of the candidates `unknown` broke.
@@ -58,7 +58,7 @@ class Refusal:
     round: int | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Node:
     """An environment that the run has reached, in the tree of its reductions; number 0 is the whole world, without parent.
 
@@ -106,7 +106,7 @@ def path(nodes: Sequence[Node], number: int | None) -> tuple[Node, ...]:
     return tuple(reversed(found))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
     """What fresh runs show of the environment of `node`; number 1 is the run's first certificate. Its terms are those of
     `CertificateStarted`, and `first_run` is the number of its first run. `claims` are empty while its tests are made. `past`: a
@@ -129,7 +129,7 @@ class Certificate:
     elsewhere: e.EndsElsewhere | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
     """One claim of a certificate, as in `ClaimMade`: about what is left, or, if `without` is a model, about that without it.
     `verdict`: what is left is "kept" (it keeps the rate), "lost", or "exact" (its rate was only measured); a model is "needed"
@@ -162,7 +162,7 @@ class Point:
     needed: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
     """A decision of the user: `kind` is the event's, `words` describe it; at Unix `time`, s, after `tests` tests, in `node`."""
 
@@ -185,7 +185,7 @@ class Removal:
     tests: Numbers = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Returned:
     """What fresh runs show of a world that passes; or, if `back` is a model, of that with it (and its stack) put back. `verdict`:
     the world "passes" or "fails"; a model has to go ("needed") or not ("not needed"); "not shown" if the runs do not decide,
@@ -208,7 +208,7 @@ class Check:
     claims: tuple[Returned, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Isolation:
     """A search for the fewest models that have to go from the whole world so that the robot reaches its goal, as it was `asked`.
     `checks` are fresh runs of what the search found; a check that shows something else sends it on. `ended`: `found` is the removal
@@ -231,7 +231,7 @@ class NumberTried:
     error: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Margins:
     """How far numbers may change in the environment that was asked for, as `runs` and values that are `impossible` show. The last
     call is as it was `asked`, after the first `before_call` runs, and `earlier` runs in other environments. `ended`: the search is

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 EngineIs = Literal["alive", "starting", "absent"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
     """All that the run screen shows at one moment.
 

@@ -102,7 +102,7 @@ FIRST_FRESH_RUN = 10_000
 FRESH_RUNS = 1000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RunState:
     """A whole run. `status`:
 
@@ -344,7 +344,7 @@ class RunState:
         return self.status in ("finished", "stopped", "failed")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Round:
     """One round: `partitions` in the order they are tried, and without how many parts f was `missed`. `winner` is the index of the
     candidate that became the environment, `accepted` that of one that the user accepted, or None.
@@ -368,7 +368,7 @@ class Round:
         return self.split.partitions
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Split:
     """An environment and its disjoint parts, shared by all candidates of a round; by name, and as `whole` and `parts` by number.
     `pinned` models of the environment are in no part, but in every candidate. `letters` has the number of each part's letter: a
@@ -394,7 +394,7 @@ class Split:
         return {name: letter for letter, part in self.lettered for name in part}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
     """A sub-environment to try. `kind` is "partition" or "complement" of partition number `partition` of `split`.
 
@@ -441,7 +441,7 @@ class Candidate:
         return f"part {letter}" if self.kind == "partition" else f"without {letter}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
     """A sub-environment selected by the user. `models` are the ones it keeps of the whole world; it was tried in `node`. `verdict`
     and `tests` are as in a candidate. `adopted`: it became the environment.
@@ -465,7 +465,7 @@ class Trial:
         return f"try {self.number}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Test:
     """Run number `run` of environment number `environment`, with its seed.
 

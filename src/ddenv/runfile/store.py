@@ -91,7 +91,7 @@ class Request:
     data: Data
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Live:
     """A running test: simulated `time`, s, the pose (x, y, z m, qw, qx, qy, qz) of the robot, and those of models that moved."""
 
@@ -278,7 +278,7 @@ class RunFile:
         for slot, test, at, text in self._all("SELECT slot, test, time, pose FROM live ORDER BY slot"):
             try:
                 number, time, poses = read(tuple[int, Real, dict[str, Pose]], f"[{test}, {at}, {text}]")
-                found.append(Live(slot, number, time, poses.pop(ROBOT), poses))
+                found.append(Live(slot=slot, test=number, time=time, pose=poses.pop(ROBOT), models=poses))
             except (Invalid, KeyError):
                 raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
         return found

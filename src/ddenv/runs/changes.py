@@ -19,7 +19,7 @@ from ddenv.world.sdf.numbers import move_of
 Limit = tuple[str, Model, Pose]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
     """A number with another `value`, `share` of its scale away, at a limit of its margin, as `sentence` says; it means `changes` of
     numbers to values. `parting` compares two runs with one seed, of what is left as it is and with that value; None where no such
@@ -59,7 +59,7 @@ def changes(file: RunFile, state: RunState, world: World | None) -> tuple[Change
         share = abs(value.value - asked.now) / asked.scale
         words = f"{row.sentence}. {parting_words(parting, '', '')}".rstrip()
         to = changes_at(asked, value.value)
-        found.append(Change(asked.name, value.value, share, to, value.verdict, words, parting, tuple(limits)))
+        found.append(Change(name=asked.name, value=value.value, share=share, changes=to, verdict=value.verdict, sentence=words, parting=parting, limits=tuple(limits)))
     return tuple(found)
 
 
@@ -78,9 +78,20 @@ def changed_run(state: RunState, number: int) -> tuple[MarginRan, Test]:
     if margins is None or not 0 <= place < len(margins.runs):
         raise UserError(f"there is no run {-number} with a changed number")
     one = margins.runs[place]
-    ended = one.outcome, one.failure, one.distance, one.end_pose
-    changed = f"{one.name} = {one.value:.4g}"
-    return one, Test(number, margins.asked.environment, changed, None, None, one.run, one.seed, *ended)
+    test = Test(
+        id=number,
+        environment=margins.asked.environment,
+        phase=f"{one.name} = {one.value:.4g}",
+        round=None,
+        candidate=None,
+        run=one.run,
+        seed=one.seed,
+        outcome=one.outcome,
+        failure=one.failure,
+        distance=one.distance,
+        end_pose=one.end_pose,
+    )
+    return one, test
 
 
 def _parting(file: RunFile, state: RunState, name: str, value: float) -> Parting | None:
@@ -91,5 +102,15 @@ def _parting(file: RunFile, state: RunState, name: str, value: float) -> Parting
     for place, one in enumerate(margins.runs):
         number = -1 - margins.earlier - place
         if (one.name, one.value, one.run) == (name, value, left.run) and (samples := file.motion(number)):
-            return Parting(left.id, number, left.seed, *parted(file.trajectory(left.id), samples), None, False)
+            equal, apart, parted_at = parted(file.trajectory(left.id), samples)
+            return Parting(
+                with_test=left.id,
+                without_test=number,
+                seed=left.seed,
+                equal=equal,
+                apart=apart,
+                place=parted_at,
+                met=None,
+                touched=False,
+            )
     return None

@@ -112,4 +112,4 @@ def _write(
     number = {name: at for at, name in enumerate(elements)}
     # What is welded to a model that stays is tied to nothing.
     welds = tuple((number[one], number[other]) for one, other in world.ties if one in number and other in number)
-    create(path, documents, Created(scenario.model_dump(mode="json"), elements, welds))
+    create(path, documents, Created(scenario=scenario.model_dump(mode="json"), elements=elements, welds=welds))

@@ -26,7 +26,7 @@ FARTHEST = 1e6
 ANOTHER_SIMULATOR = "Another simulator made this run: only the robot's path is stored; models stay where they start."
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Played:
     """A finished test. `words` say what it was made for; `models` were in it.
 
@@ -93,7 +93,7 @@ def played(file: RunFile, position: Position, number: int) -> Played:
         lacks.append(
             f"The run file has no path of the robot in test {number} (bundles leave paths out): nothing moves here."
         )
-    return Played(test, words, position.end.models_of(test), rows, moving if rows else {}, tuple(lacks))
+    return Played(test=test, words=words, models=position.end.models_of(test), rows=rows, moving=moving if rows else {}, lacks=tuple(lacks))
 
 
 def _stored(file: RunFile, number: int, lacks: list[str]) -> dict[str, array[float]]:

@@ -38,7 +38,7 @@ NEAR = 0.5
 APART = 0.1
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class End:
     """A way in which `number` runs ended, after `seconds` of simulated time (their median) at `place`, x and y, m (medians).
 
@@ -54,7 +54,7 @@ class End:
     away: float = math.nan
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Parting:
     """Where two runs with the same seed part: one of what is left, which shows f, and one without a model.
 
@@ -72,7 +72,7 @@ class Parting:
     touched: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reason:
     """What happens without the model `without` and what rests on it, all of `gone`.
 
@@ -109,7 +109,7 @@ def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
         pairs = ((left[test.run], test) for test in mine if test.run in left and _kind(test) == shown)
         parting, _, lacks = parting_of(file, next(pairs, None), gone)
         exact = bool(certificate.seeds)
-        found.append(Reason(str(claim.without), gone, len(mine), tuple(ends), parting, lacks, exact))
+        found.append(Reason(without=str(claim.without), gone=gone, runs=len(mine), ends=tuple(ends), parting=parting, lacks=lacks, exact=exact))
     return tuple(found)
 
 
@@ -129,7 +129,7 @@ def _end(kind: str, tests: Sequence[Test]) -> End:
     x, y = (median(place[axis] for place in places) for axis in range(2))
     reach = max(math.dist((x, y), place) for place in places)
     away = median([test.distance for test in tests if test.distance is not None] or [math.nan])
-    return End(kind, len(tests), median(test.simulated_seconds for test in tests), (x, y), reach, away)
+    return End(kind=kind, number=len(tests), seconds=median(test.simulated_seconds for test in tests), place=(x, y), reach=reach, away=away)
 
 
 def parting_of(file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str]) -> tuple[Parting | None, str, str]:
@@ -146,7 +146,7 @@ def parting_of(file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str
     touched = {model: at for model, at in with_it.first_touched if model in gone}
     met = touched or {model: at for model, at in with_it.first_sensed if model in gone}
     first = min(met, key=met.__getitem__, default="")
-    parting = Parting(with_it.id, without.id, with_it.seed, equal, apart, place, met.get(first), bool(touched))
+    parting = Parting(with_test=with_it.id, without_test=without.id, seed=with_it.seed, equal=equal, apart=apart, place=place, met=met.get(first), touched=bool(touched))
     return parting, first, ""
 
 
@@ -219,7 +219,7 @@ def parting_words(one: Parting | None, lacks: str, met: str, it: str = "it") -> 
 # The nearest world that passes, beside the whole world that fails.
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Nearest:
     """The nearest world that passes: the whole world without the models `gone`.
 
@@ -251,7 +251,7 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
     words = of_passing(state, one)
     shown = is_nearest(one)
     if one.found is None:
-        return Nearest((), words, shown)
+        return Nearest(gone=(), words=words, shown=shown)
     gone = state.removals[one.found - 1].models
     # A run of the whole world that fails, if possible as in f, and one of its seed, in the passing world, that does not.
     passing = {test.run: test for test in state.tests if test.removal == one.found and test.outcome == GOAL}
@@ -259,7 +259,7 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
     failing = [test for test in whole if test.outcome in (F, "other")]
     chosen = min(failing, key=lambda test: (test.outcome != F, test.cut, test.id), default=None)
     parting, first, lacks = parting_of(file, None if chosen is None else (chosen, passing[chosen.run]), gone)
-    return Nearest(gone, words, shown, parting, first, lacks)
+    return Nearest(gone=gone, words=words, shown=shown, parting=parting, first=first, lacks=lacks)
 
 
 def removed_in_passing(state: RunState, where: object) -> Names:

@@ -16,7 +16,7 @@ from ddenv.words.signs import STATUS
 ENDED = ("created", "finished", "stopped", "failed")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Recent:
     """One run. `status` is the state's, "lost" if its engine has died, or "" if it is not read yet.
 
@@ -66,8 +66,8 @@ def recent_of(path: Path, state: RunState, changed: float) -> Recent:
     """A run in a file that was last `changed` then (Unix time, s), as its state says."""
     options = settings(state)
     return Recent(
-        path,
-        state.updated_at or changed,
+        path=path,
+        changed=state.updated_at or changed,
         status=state.status,
         scenario=options.name,
         algorithm=options.algorithm,

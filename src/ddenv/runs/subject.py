@@ -45,7 +45,7 @@ NAMED = 3
 LONGEST = 60
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Subject:
     """What the robot is run in. Of a run, `run` is its file, and `state` its last one."""
 
@@ -68,7 +68,8 @@ def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None 
     kind, path = named(name) or ("scenario", Path(name))
     if kind != "run":
         scenario = scenario_named(name, given, announce)
-        return Subject(scenario, *load_parts(scenario))
+        world, robot = load_parts(scenario)
+        return Subject(scenario=scenario, world=world, robot=robot)
     if has_options(given):
         raise UserError(
             "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore, --inside and --fetch are only for scenarios; "
@@ -309,7 +310,7 @@ def read_subject(file: RunFile) -> Subject:
     scenario, world, robot = read_parts(file)
     state = fold(file.events())
     failure = scenario.failure.model_copy(update={"epsilon": read(state.scenario, SETTINGS["epsilon"])})
-    return Subject(scenario.model_copy(update={"failure": failure}), world, robot, file.path, state)
+    return Subject(scenario=scenario.model_copy(update={"failure": failure}), world=world, robot=robot, run=file.path, state=state)
 
 
 def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:

@@ -13,7 +13,7 @@ from ddenv.runfile.tested import purpose
 HOLD = 3.0  # how long a finished test stays on screen until the next one starts, s
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Shot:
     """What is shown: a running test ("live"), a replay of a finished one ("replay"), or the robot at its start ("start").
 
@@ -77,4 +77,4 @@ def shot_of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial 
 
 def _shot(state: RunState, kind: str, test: int | None, models: frozenset[str], title: str) -> Shot:
     kept = frozenset(state.environment)
-    return Shot(kind, test, models, kept - models, frozenset(state.elements) - kept - models, title)
+    return Shot(kind=kind, test=test, models=models, left_out=kept - models, removed=frozenset(state.elements) - kept - models, title=title)

@@ -24,7 +24,7 @@ OUT = 0.003
 SPOKE_COLOR = (0.75, 0.76, 0.78, 1.0)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Wheel:
     """A wheel: its name in the browser, what is drawn around its centre, and in the first link's frame its place and `axis`.
 
@@ -93,4 +93,4 @@ class Wheels:
             bars = [mesh.box(size).at(at) for size in ((long, width, thick), (thick, width, long))]
             spokes = mesh.merge(bars).painted(SPOKE_COLOR)
             whole = replace(mesh.merge([wheel, spokes]), alpha=1.0)
-            yield Wheel(f"wheel {number}", whole, place, (x, y, z), 0 if left else 1)
+            yield Wheel(key=f"wheel {number}", painted=whole, position=place, axis=(x, y, z), side=0 if left else 1)

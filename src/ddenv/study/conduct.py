@@ -112,7 +112,7 @@ class Runner:
         self._out = out
         self._live = out.isatty() and os.environ.get("TERM") != "dumb"
         self._earlier = sessions(folder)
-        self._session = Session(time.time(), 0.0, jobs, 0, versions(), machine())
+        self._session = Session(begun=time.time(), seconds=0.0, jobs=jobs, tests=0, versions=versions(), machine=machine())
         self._began = self._next_record = time.monotonic()
         self._next_line = self._began + QUIET
 

@@ -42,7 +42,7 @@ def opened(folder: Path) -> Iterator[None]:
         yield
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Session:
     """One session of work on the study. `begun` is Unix time, s; `seconds` and `tests` count this session so far."""
 

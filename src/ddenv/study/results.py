@@ -59,7 +59,7 @@ def _compared(scenario: object) -> object:
     return kept
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
     """`tests` are the baseline and the tests behind each verdict of the search, `reruns` of them re-runs; `certificate_tests` are
     those that the certificates rest on. They do not depend on the number of workers; tests made `ahead` of time and not needed do.
@@ -117,14 +117,14 @@ def read_cell(folder: Path, cell: Cell) -> Result:
     """The result of a cell so far; if it cannot be read, `problem` says so."""
     path = run_path(folder, cell)
     if not path.exists():
-        return Result(cell)
+        return Result(cell=cell)
     try:
         with RunFile(path) as file:
             result = _read(file, cell)
             other = difference(file, cell)
     except UserError as error:
-        return Result(cell, problem=str(error))
-    return Result(cell, problem=f"its run was made with {other}") if other else result
+        return Result(cell=cell, problem=str(error))
+    return Result(cell=cell, problem=f"its run was made with {other}") if other else result
 
 
 def _read(file: RunFile, cell: Cell) -> Result:
@@ -137,7 +137,7 @@ def _read(file: RunFile, cell: Cell) -> Result:
     steps_back = 0
     for recorded, _, state in steps(file.events()):
         match event := recorded.event:
-            case TestFinished(test) if state.test(test).phase == "baseline":
+            case TestFinished(test=test) if state.test(test).phase == "baseline":
                 search[test] = None
             case CandidateJudged():
                 search |= dict.fromkeys(event.tests)
@@ -157,7 +157,7 @@ def _read(file: RunFile, cell: Cell) -> Result:
     # A certificate runs the whole world only where what is left missed f: its runs would show the rate as too low.
     whole = [test.outcome for test in tests if test.environment == 0 and test.outcome in ("similar", "other", "pass")]
     return Result(
-        cell,
+        cell=cell,
         ended=state.ended,
         minimal=minimal,
         problem="" if minimal else problem,

@@ -50,7 +50,7 @@ class WheelSpeeds:
     speeds: Mapping[str, float]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
     """The wheel joints by name, in the model's order; `left` is True for those on the left side. `radius` and `track` in m.
 

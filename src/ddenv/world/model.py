@@ -98,7 +98,7 @@ class Piece:
     pose: Pose
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Collision:
     """`mu` is the Coulomb friction coefficient: the smaller of SDF's `ode/mu` and `ode/mu2`.
 
@@ -136,7 +136,7 @@ class Inertia:
     products: Vector = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
     name: str
     pose: Pose
@@ -145,7 +145,7 @@ class Link:
     visuals: tuple[Visual, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
     """A joint between two links of one model; `pose` is the joint frame, `axis` a unit vector in the world frame.
 
@@ -178,7 +178,7 @@ def is_fixed(joint: Joint) -> bool:
     return joint.kind == "fixed" or (limited and joint.upper - joint.lower < PLAY and joint.lower <= 0 <= joint.upper)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
     """A model of the world, including the links and joints of its nested models (named `inner::link`).
 
@@ -229,7 +229,7 @@ def jointed_links(model: Model) -> dict[str, Link]:
     return {f"{model.name}::{link.name}": link for link in model.links}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Note:
     """A part of the file that was replaced or ignored (`kind`).
 
@@ -264,7 +264,7 @@ class Shared:
     instead: bytes = b""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class World:
     """An SDF world. `text` is the file's content; `models` are in the file's order; `gravity` is in m/s^2.
 

@@ -74,7 +74,7 @@ def parse_xml(text: bytes, source: Path, root: str = "") -> Element:
     if text.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in text[:100]:
         raise NotXml("is UTF-16, UTF-32 or not text; save it as UTF-8")
     start = len(BYTE_ORDER_MARK) if text.startswith(BYTE_ORDER_MARK) else 0
-    scanner = _Scanner(text, source, _encoding(text, start), at=start)
+    scanner = _Scanner(text=text, source=source, encoding=_encoding(text, start), at=start)
     if control := _CONTROL.search(text):
         raise scanner.fault(control.start(), f"a control character (byte 0x{ord(control[0]):02x})")
     scanner.run()
@@ -124,7 +124,7 @@ def _encoding(text: bytes, start: int) -> str:
     return name
 
 
-@dataclass
+@dataclass(kw_only=True)
 class _Scanner:
     """Reads `text` from byte `at` on. `open` are the elements around it, `words` the text so far of the innermost one."""
 

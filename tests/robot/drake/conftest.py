@@ -18,11 +18,11 @@ ROAD = Box((6.0, WIDTH, 0.1))
 
 
 def piece(name: str, shape: Shape, pose: Pose) -> Collision:
-    return Collision(name, shape, pose, 1.0)
+    return Collision(name=name, shape=shape, pose=pose, mu=1.0)
 
 
 def static(name: str, *collisions: Collision) -> Model:
-    return Model(name, Pose(), True, (Link("link", Pose(), None, collisions, ()),), (), (), 1)
+    return Model(name=name, pose=Pose(), static=True, links=(Link(name="link", pose=Pose(), inertia=None, collisions=collisions, visuals=()),), joints=(), spans=(), line=1)
 
 
 @pytest.fixture(scope="session")

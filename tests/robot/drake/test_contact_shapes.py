@@ -78,7 +78,7 @@ def test_the_huskys_wheel_is_one_ring_of_24_spheres(husky):
     ids=["cylinder", "ellipsoid", "mesh", "mesh beside its frame", "mesh of 10,000 vertices"],
 )
 def test_what_turns_about_its_own_axis_is_a_wheel(shape, pose, width):
-    wheel = wheel_of(Collision("c", shape, pose, 1.0), AXLE)
+    wheel = wheel_of(Collision(name="c", shape=shape, pose=pose, mu=1.0), AXLE)
     assert wheel is not None
     assert (wheel.radius, wheel.width) == pytest.approx((0.2, width), rel=0.01)
 
@@ -95,7 +95,7 @@ def test_what_turns_about_its_own_axis_is_a_wheel(shape, pose, width):
     ids=["another axis", "off its axis", "box", "sphere", "wedge"],
 )
 def test_what_does_not_roll_is_no_wheel(shape, pose):
-    assert wheel_of(Collision("c", shape, pose, 1.0), AXLE) is None
+    assert wheel_of(Collision(name="c", shape=shape, pose=pose, mu=1.0), AXLE) is None
 
 
 @given(radii, st.floats(0.01, 3.0), st.booleans())

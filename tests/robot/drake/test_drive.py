@@ -195,8 +195,22 @@ def test_links_without_mass_are_frames_of_what_they_are_fixed_to(husky, world_of
 
 def straight(x: float, y: float = 0.0, tolerance: float = 0.5, **settings: float) -> Straight:
     controller = Controller(**settings)
-    limits = controller.period, controller.speed, controller.acceleration, controller.turn_rate
-    return Straight(Setup((x, y), tolerance, (0, 0, 0), (), (), 0.1, 0.5, (0, 0, 0, 0), *limits, settings=controller))
+    setup = Setup(
+        goal=(x, y),
+        tolerance=tolerance,
+        start=(0, 0, 0),
+        joints=(),
+        left=(),
+        radius=0.1,
+        track=0.5,
+        footprint=(0, 0, 0, 0),
+        period=controller.period,
+        speed=controller.speed,
+        acceleration=controller.acceleration,
+        turn_rate=controller.turn_rate,
+        settings=controller,
+    )
+    return Straight(setup)
 
 
 def reading(x: float) -> Reading:

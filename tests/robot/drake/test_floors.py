@@ -138,7 +138,7 @@ def test_nothing_sinks_by_more_than_5_mm(world_of, husky, scenario_of, mass, sha
     place = Pose((0.0, 9.0, height + 0.005))
     inertia = Inertia(mass, place, (0.05 * mass * grown**2,) * 3)
     thing = Model(
-        "thing", place, False, (Link("link", place, inertia, (Collision("c", body, place, 1.0),), ()),), (), (), 1
+        name="thing", pose=place, static=False, links=(Link(name="link", pose=place, inertia=inertia, collisions=(Collision(name="c", shape=body, pose=place, mu=1.0),), visuals=()),), joints=(), spans=(), line=1
     )
     world = world_of()
     scenario = scenario_of(failure={"timeout": 2.0}, goal={"x": 9, "y": 0})

@@ -185,7 +185,7 @@ def test_a_mesh_of_many_corners_gets_32_spread_over_it():
 def tile(across: int) -> list[Collision]:
     """A tile of `across` times `across` boxes, 0.5 m apart, with every other one a step higher."""
     places = [(0.5 * i, 0.5 * j, 0.1 * ((i + j) % 2)) for i in range(across) for j in range(across)]
-    return [Collision("box", Box((0.5, 0.5, 0.2)), Pose(place), 0.5) for place in places]
+    return [Collision(name="box", shape=Box((0.5, 0.5, 0.2)), pose=Pose(place), mu=0.5) for place in places]
 
 
 def test_a_link_of_few_shapes_rests_on_all_of_their_corners():

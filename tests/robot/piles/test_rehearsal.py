@@ -78,7 +78,7 @@ def test_a_pile_that_breaks_is_named_and_the_robot_still_runs(world_of, add, sim
 
 def test_a_pile_that_never_rests_is_named(world_of, add, simulator):
     wheel = model_of("wheel", link_of("link", Box((0.3, 0.3, 0.3)), Pose((4, 3, 3.0))))
-    ways = Settled(2.0, {"wheel": (Pose((4, 3, 2.0)),)}, restless=("wheel",), fallen=("lost",))
+    ways = Settled(seconds=2.0, places={"wheel": (Pose((4, 3, 2.0)),)}, restless=("wheel",), fallen=("lost",))
     assert (
         dict(notes_on(add(world_of(), wheel), ways))["restless"] == "1 model does not come to rest within 2.0 s (wheel)"
     )

@@ -27,7 +27,7 @@ def loose(name: str, shape: Shape, pose: Pose) -> Model:
 
 
 def obstacles_of(*models: Model) -> Obstacles:
-    return Obstacles.of(World(Path("world.sdf"), "world", b"", (0.0, 0.0, -9.81), models))
+    return Obstacles.of(World(path=Path("world.sdf"), name="world", text=b"", gravity=(0.0, 0.0, -9.81), models=models))
 
 
 def plain(**settings: float) -> scenario.Lidar:

@@ -122,7 +122,7 @@ async def test_enter_selects_the_model_under_the_crosshair_and_again_no_longer(b
         world.select(["crate_00", "crate_04"])
         state = world.snapshot.state
         left = tuple(name for name in state.environment if name != "crate_04")
-        world.show(Snapshot(state.changed(environment=left)), None)
+        world.show(Snapshot(state=state.changed(environment=left)), None)
         await pilot.pause()
         assert pilot.app.selections[-1] == world.selection == {"crate_00"}
 
@@ -221,7 +221,7 @@ async def test_layers_are_shown_or_not(run, layer):
         sensed = tuple((f"crate_{number:02}", 5.0 - number) for number in range(3))
         tests = [each if each.id != test else fake_sensed(state, each, sensed) for each in state.tests]
         world.show(
-            Snapshot(state.changed(tests=type(state.tests).of(tests)), (), "absent", world.snapshot.evidence), None
+            Snapshot(state=state.changed(tests=type(state.tests).of(tests)), live=(), engine="absent", evidence=world.snapshot.evidence), None
         )
         pilot.app.set_focus(None)
         await pilot.pause()
@@ -272,7 +272,7 @@ async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):
         moved = type(world.snapshot.evidence)("d", world.snapshot.evidence)
         for index in range(2, len(moved), 8):
             moved[index] -= 2.0
-        world.show(Snapshot(world.snapshot.state, evidence=world.snapshot.evidence, original=moved), None)
+        world.show(Snapshot(state=world.snapshot.state, evidence=world.snapshot.evidence, original=moved), None)
         new = world.picture.canvas.chars[(world.picture.canvas.chars != before)]
         assert (new > 0x2800).any()
         assert "path of f" in legend(world.shown, 100).plain
@@ -287,7 +287,7 @@ async def test_only_the_rows_of_the_robot_are_drawn_when_only_it_moves(busy, mon
         snapshot = world.snapshot
         first, second = snapshot.live
         x, y, *rest = first.pose
-        moved = Live(first.slot, first.test, first.time + 0.1, (x + 0.3, y, *rest))
+        moved = Live(slot=first.slot, test=first.test, time=first.time + 0.1, pose=(x + 0.3, y, *rest))
         world.show(replace(snapshot, live=(moved, second)), None)
         assert 1 <= len(regions) <= 2
 
@@ -338,7 +338,7 @@ async def test_strange_names_are_one_harmless_line(runs):
 async def test_worlds_of_few_models(count):
     prints = tuple(Footprint(f"m{number}", (), (1.0, 1.0), (1.0, 1.0)) for number in range(count))
     async with Shown() as (pilot, world):
-        world.set_place(Place(prints, (0.0, 0.0, 0.0), (3.0, 0.0), frozenset(each.name for each in prints)))
+        world.set_place(Place(prints=prints, spawn=(0.0, 0.0, 0.0), goal=(3.0, 0.0), elements=frozenset(each.name for each in prints)))
         await pilot.press("]", "enter", "up", "plus")
         text = text_of(world)
         assert "S" in text
@@ -353,7 +353,7 @@ async def test_two_ways_fill_the_map_of_a_large_world(reach):
     prints = tuple(Footprint(f"m{x}", (), (x, 0.0), (x + 1.0, 1.0)) for x in range(-reach, reach, 5))
     ways = tuple(Way(name, np.linspace((0, 0), (6, y), 20)) for name, y in (("with", 0.5), ("without", -0.5)))
     async with Shown() as (pilot, world):
-        world.set_place(Place(prints, (0.0, 0.0, 0.0), (6.0, 0.0), frozenset(each.name for each in prints)))
+        world.set_place(Place(prints=prints, spawn=(0.0, 0.0, 0.0), goal=(6.0, 0.0), elements=frozenset(each.name for each in prints)))
         world.show_ways(ways, None, None, world.place.prints)
         await pilot.pause()
         view = world.viewport.view

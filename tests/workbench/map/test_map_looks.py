@@ -12,7 +12,7 @@ from ddenv.workbench.map.model_looks import GONE, Kept, fill, ghosts, looks
 
 DARK, LIGHT = ((15, 20, 27), (213, 219, 229)), ((250, 250, 250), (30, 30, 30))
 PALETTES = {"dark": mixed(*DARK), "light": mixed(*LIGHT), "own": mixed(*OWN[True], own=True)}
-VIEW = View(0, 0, 0.5, 20, 6)
+VIEW = View(x=0, y=0, scale=0.5, columns=20, rows=6)
 
 
 def squares(count: int, size: float = 1.0) -> list[Footprint]:
@@ -34,7 +34,7 @@ def drawn(prints, who, palette):
 
 def who_of(prints, parts=None, **rest) -> Kept:
     names = frozenset(each.name for each in prints)
-    return Kept(names, names, parts=parts or {}, **rest)
+    return Kept(elements=names, environment=names, parts=parts or {}, **rest)
 
 
 @pytest.mark.parametrize("name", PALETTES)
@@ -79,7 +79,7 @@ def test_dots_of_removed_models_leave_the_floor_around_them_whole(name):
     floor = Footprint("floor", (np.array([(-5, -1.25), (5, -1.25), (5, 1.25), (-5, 1.25)]),), (-5, -1.25), (5, 1.25))
     prints = [floor, *squares(3, 0.5)]
     names = frozenset(each.name for each in prints)
-    how = looks(prints, Kept(names, frozenset({"floor"})), palette)
+    how = looks(prints, Kept(elements=names, environment=frozenset({"floor"})), palette)
     grids = [
         owners(masks(prints, VIEW), VIEW, np.flatnonzero(one)) for one in (how.kinds == REMOVED, how.kinds == FLOOR)
     ]

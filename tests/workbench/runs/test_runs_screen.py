@@ -116,7 +116,7 @@ async def test_every_run_says_how_it_stands(several, runs):
 
 async def test_while_runs_are_first_read_a_cursor_that_nobody_moved_stays_at_the_newest_run():
     copied, new, old = (
-        Recent(Path(f"{name}.ddenv"), changed) for name, changed in (("a", 9.0), ("b", 8.0), ("c", 7.0))
+        Recent(path=Path(f"{name}.ddenv"), changed=changed) for name, changed in (("a", 9.0), ("b", 8.0), ("c", 7.0))
     )
     app = App()
     async with app.run_test() as pilot:

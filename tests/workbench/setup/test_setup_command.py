@@ -25,7 +25,7 @@ def own(scenarios):
 
 def told(path, own, asked, jobs=4, name=""):
     """The command for a scenario of the file `path`."""
-    return command_words(Choice(path, None, own), asked, jobs, name)
+    return command_words(Choice(path=path, world=None, settings=own), asked, jobs, name)
 
 
 @pytest.fixture

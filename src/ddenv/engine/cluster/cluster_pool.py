@@ -146,7 +146,7 @@ class Link:
         self._thread.join(ANSWER)
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class _Worker:
     """A Dask worker that can make `threads` tests at a time; `accepted` once it has shown the same bits. `hello` is None until it
     has answered. `asked` has by key what it does now, None for a hello; the scheduler drops it with its future.
@@ -182,7 +182,7 @@ class ClusterPool:
         self._blob = pickle.dumps(self._parts)
         self._run = f"{__version__} {sha256(self._blob).hexdigest()}"
         self._topic = f"ddenv-{uuid.uuid4().hex}"
-        self._whole = Run(frozenset(world.elements(scenario.protected)), seed_of(scenario.reduction, 0))
+        self._whole = Run(keep=frozenset(world.elements(scenario.protected)), seed=seed_of(scenario.reduction, 0))
         self._workers: dict[str, _Worker] = {}
         self._waiting: list[Asked] = []
         # Workers that have answered, each with the run that it made to compare.
@@ -287,7 +287,7 @@ class ClusterPool:
         if gone:
             again = f"; {count(lost, 'test')} repeated elsewhere" if lost else ""
             self._news.append(f"{count(len(gone), 'worker')} left the cluster{again}")
-        new = [_Worker(address, threads[address]) for address in threads if address not in self._workers]
+        new = [_Worker(address=address, threads=threads[address]) for address in threads if address not in self._workers]
         for worker in new:
             self._workers[worker.address] = worker
             self._hand_out(worker, greet, Asked(self._run, self._topic, REFERENCE, self._whole), None)
@@ -394,7 +394,7 @@ class ClusterPool:
     def live(self) -> list[tuple[Live, float]]:
         """As `Pool.live`."""
         rows = (row for test in self._tests if (row := self._progress.get(test)) is not None)
-        return [(Live(row["test"], row["test"], row["time"], row["pose"], row["models"]), row["real"]) for row in rows]
+        return [(Live(slot=row["test"], test=row["test"], time=row["time"], pose=row["pose"], models=row["models"]), row["real"]) for row in rows]
 
     def close(self) -> None:
         """Drops what runs: the workers end it by themselves."""

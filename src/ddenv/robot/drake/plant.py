@@ -56,7 +56,7 @@ APART = 1e3
 MANY = 8  # a model with more shapes than this has a twin with bodies of its own, see `Twin`
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Part:
     """A collision shape of a twin on the world's body, at `pose` in the frame of the model's link with the number `link`.
 
@@ -84,7 +84,7 @@ class Twin:
     places: tuple[tuple[FixedOffsetFrame, RigidTransform], ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Body:
     """A model in the plant, the first link first.
 
@@ -105,7 +105,7 @@ class Body:
         return self.links[0]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Built:
     """The plant of a world.
 
@@ -182,7 +182,7 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
         name: [pair for pair in combinations(filter(None, found), 2) if not filtered(pair[0][0], pair[1][0])]
         for name, found in shapes.items()
     }
-    return Built(builder.Build(), plant, scene_graph, driver, static, moving, twins, own_pairs, apart)
+    return Built(diagram=builder.Build(), plant=plant, scene_graph=scene_graph, robot=driver, static=static, moving=moving, twins=twins, own_pairs=own_pairs, apart=apart)
 
 
 def _apart(
@@ -243,7 +243,7 @@ def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
                 away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
                 geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, solid.shape, name, solid.surface)
                 place = transform(link.pose.inverse() @ solid.pose)
-                parts.append(Part(geometry, number, solid.shape, place, away))
+                parts.append(Part(geometry=geometry, link=number, shape=solid.shape, pose=place, away=away))
         return Twin(tuple(part.geometry for part in parts), parts=tuple(parts))
     instance = plant.AddModelInstance(f"twin/{model.name}")
     shapes: list[GeometryId] = []
@@ -286,7 +286,7 @@ def _add_moving(
     if not model.gravity:
         plant.set_gravity_enabled(instance, False)
     poses = tuple(link.pose for link in model.links)
-    return Body(model.name, instance, tuple(bodies), poses, tuple(geometry), tuple(boxes))
+    return Body(name=model.name, instance=instance, links=tuple(bodies), poses=poses, geometry=tuple(geometry), bounds=tuple(boxes))
 
 
 def _inertia(model: Model, link: Link) -> SpatialInertia:

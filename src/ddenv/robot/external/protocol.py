@@ -23,7 +23,7 @@ from ddenv.text import Names
 Row = tuple[float, Sequence[float]] | tuple[float, Sequence[float], Mapping[str, Sequence[float]]]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatorSetup:
     """What a simulator knows before its first test.
 

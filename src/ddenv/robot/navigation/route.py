@@ -16,7 +16,7 @@ from ddenv.robot.protocol import Setup
 from ddenv.world.pose import Point
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Leg:
     """A straight leg from (x, y) in the direction (cosine, sine), `length` m long."""
 
@@ -46,7 +46,7 @@ class Path:
             dy = end[1] - y
             length = math.hypot(dx, dy)
             cosine, sine = (dx / length, dy / length) if length else (1.0, 0.0)
-            self._legs.append(Leg(x, y, cosine, sine, length))
+            self._legs.append(Leg(x=x, y=y, cosine=cosine, sine=sine, length=length))
         # The length of the path from the start of each leg.
         self._rests = list(accumulate(leg.length for leg in self._legs[::-1]))[::-1]
         self._number = 0

@@ -20,7 +20,7 @@ NEAR = 0.1  # m; models this near to something that moves are simulated with it
 NOTHING = -1e6  # half the size of a box around nothing: no other box is ever near it, m
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Motion:
     """Where N links are and how fast they move.
 
@@ -38,14 +38,20 @@ class Motion:
     def still(cls, count: int) -> Motion:
         """`count` links at rest at the world's origin."""
         zeros = np.zeros((count, 3))
-        return cls(zeros, zeros.copy(), np.zeros(count), zeros.copy(), np.zeros((count, 3, 3)))
+        return cls(
+            low=zeros,
+            high=zeros.copy(),
+            speed=np.zeros(count),
+            places=zeros.copy(),
+            turns=np.zeros((count, 3, 3)),
+        )
 
     def of(self, numbers: Sequence[int]) -> Motion:
         """The motion of the links `numbers` alone."""
-        return Motion(*(part[numbers] for part in vars(self).values()))
+        return Motion(**{name: part[numbers] for name, part in vars(self).items()})
 
     def copy(self) -> Motion:
-        return Motion(*(part.copy() for part in vars(self).values()))
+        return Motion(**{name: part.copy() for name, part in vars(self).items()})
 
     def put(self, numbers: Sequence[int], other: Motion) -> None:
         """Overwrites the motion of the links `numbers` with `other`."""
@@ -59,7 +65,7 @@ class Motion:
         return np.where(empty, self.places[:, 2], self.high[:, 2]) < height
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Links:
     """All N links of M models, one model after the other; model m begins at link `first[m]`.
 
@@ -96,7 +102,7 @@ class Links:
         moving = np.linalg.norm(np.array([rate.translational() for rate in rates]).reshape(-1, 3), axis=1)
         centers = np.einsum("nij,nj->ni", turns, self.centers[numbers]) + places
         halves = np.einsum("nij,nj->ni", np.abs(turns), self.halves[numbers])
-        return Motion(centers - halves, centers + halves, moving + turning * self.reach[numbers], places, turns)
+        return Motion(low=centers - halves, high=centers + halves, speed=moving + turning * self.reach[numbers], places=places, turns=turns)
 
     def ways(self, numbers: Sequence[int] | slice, before: Motion, after: Motion) -> Floats:
         """How far (K,) each link's farthest point has moved between two motions, m.
@@ -200,7 +206,7 @@ class Stillness:
         return self._calm >= CALM
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Script:
     """How a pile of K models moves alone, with a row for each tick of the clock.
 

@@ -332,7 +332,7 @@ class Rehearsals:
             paces.append(sleep.pace.copy())
             if sleep.at_rest.all() or tick.time >= self._longest:
                 break
-        return Script(_names(pile), np.array(states), tuple(motions), tuple(paces), sleep.at_rest)
+        return Script(names=_names(pile), states=np.array(states), motions=tuple(motions), paces=tuple(paces), resting=sleep.at_rest)
 
 
 def _names(pile: Iterable[Body]) -> Names:

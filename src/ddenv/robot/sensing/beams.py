@@ -44,7 +44,7 @@ PLANE = 2e4  # a plane is the top of a cube of this size, m: what lies below it 
 THINNEST = 1e-9  # the minimum half thickness of a shape, m
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Shapes:
     """N shapes, sorted by kind, at some instant.
 
@@ -270,7 +270,7 @@ CURVED: dict[type, type[Facets] | type[Relief]] = {Mesh: Facets, Terrain: Relief
 TURNS = np.array([[-math.tau], [0.0], [math.tau]])  # directions that differ by a full turn are the same
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Fan:
     """The B beams of a lidar: `angles` (B,) rad, their `cosines` and `sines` (B,), `step` rad between two, `range` m long."""
 
@@ -287,7 +287,7 @@ class Fan:
         cosines, sines = (np.array([of(angle) for angle in angles]) for of in (math.cos, math.sin))
         shared = np.array(angles)
         shared.setflags(write=False)
-        return cls(shared, cosines, sines, step, settings.range)
+        return cls(angles=shared, cosines=cosines, sines=sines, step=step, range=settings.range)
 
     def between(self, middle: Floats, half: Floats) -> tuple[Integers, Integers]:
         """The beams within `half` (K,) rad of the angles `middle` (K,) rad: how many for each (K,), and the numbers of all (P,)."""

@@ -33,7 +33,7 @@ LONGEST_LOOK = 10.0  # the maximum real time between two recorded poses that cou
 End = tuple[str, str, bool]
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class Run:
     """One run in a prepared context: start poses are set, removed models are switched off.
 

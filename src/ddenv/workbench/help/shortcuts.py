@@ -40,7 +40,7 @@ TEXTUAL_WORDS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Shortcut:
     """`keys` as people write them; `action` runs on `node`. It is shown dimmed while it is not `enabled`."""
 
@@ -101,7 +101,7 @@ def _merged(found: Iterable[ActiveBinding]) -> tuple[Shortcut, ...]:
         binding = active.binding
         keys = shown(",".join(each.binding.key for each in (active, *more)))
         id = binding.id or ""
-        shortcuts.append(Shortcut(keys, _words(active), binding.action, active.node, id, active.enabled))
+        shortcuts.append(Shortcut(keys=keys, words=_words(active), action=binding.action, node=active.node, id=id, enabled=active.enabled))
     return tuple(shortcuts)
 
 

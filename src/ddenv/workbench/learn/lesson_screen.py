@@ -178,7 +178,7 @@ class LessonScreen(LearnScreen[bool]):
         if test is not None:
             # With its path, as far as it is recorded, and the robot where it ended.
             pose = test.end_pose
-            live = () if pose is None or len(pose) < COLUMNS - 1 else (Live(0, test.id, 0.0, pose),)
+            live = () if pose is None or len(pose) < COLUMNS - 1 else (Live(slot=0, test=test.id, time=0.0, pose=pose),)
             snapshot = replace(snapshot, evidence=self._moments.path(test.id), live=live)
         self.query_one("#lesson-world").border_title = "World" if test is None else f"World: path of test {test.id}"
         self.query_one(Happening).show(snapshot)

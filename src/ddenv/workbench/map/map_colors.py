@@ -39,7 +39,7 @@ class Tone:
     seam: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Palette:
     """Packed colours. `back` is the map's background, or PLAIN for the terminal's own; `ground` is what is mixed with instead."""
 
@@ -83,7 +83,7 @@ def mixed(
     # The accent is moved towards the text's colour if it is too near to the background's.
     moved = (packed(blend(accent, fore, part)) for part in (0.0, 0.25, 0.5))
     live = next((each for each in moved if abs(luminance(each) - luminance(packed(ground))) > 90), packed(fore))
-    return Palette(PLAIN if own else packed(ground), ground, fore, live, packed(start), packed(goal), packed(failure))
+    return Palette(back=PLAIN if own else packed(ground), ground=ground, fore=fore, live=live, start=packed(start), goal=packed(goal), failure=packed(failure))
 
 
 def palette_of(app: App[Any], back: Color, fore: Color) -> Palette:

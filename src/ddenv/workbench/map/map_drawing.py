@@ -54,7 +54,7 @@ def _lying(prints: tuple[Footprint, ...], view: View) -> tuple[Spans, np.ndarray
     return spans(outlines, view), view.pixels(outlines.centers)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Picture:
     """A canvas for `view`, with the looks of the models and the owner of each pixel: kept models in `grid`, removed ones in `gone`.
 
@@ -201,7 +201,7 @@ def _still(shown: Shown, view: View, palette: Palette) -> Picture:
     for cell, (sign, ground) in marks.items():
         canvas.put(cell, sign, readable(ground), ground)
         written[cell] = True
-    still = Picture(view, how, canvas, grid, gone, dotted, written, cells)
+    still = Picture(view=view, how=how, canvas=canvas, grid=grid, gone=gone, dotted=dotted, written=written, cells=cells)
     if "names" in shown.layers:
         _names(still, shown.place.prints, shown.failure or shown.start)
     return still

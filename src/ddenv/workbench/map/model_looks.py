@@ -45,7 +45,7 @@ GONE = ord("·")
 FLOOR_FACTOR = 8.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Looks:
     """One entry per footprint: `kinds` (KEPT ... SELECTED), `tones` as indices into `looks`, and what stands on it in `signs`."""
 
@@ -56,7 +56,7 @@ class Looks:
     signs: Signs
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Kept:
     """Who is in the environment, and the number of each model's part.
 
@@ -82,14 +82,14 @@ def kept(shown: Shown) -> Kept:
     met = in_last(state) if "participants" in layers else None
     standing = frozenset(candidate.models) if candidate else None
     return Kept(
-        frozenset(state.elements) or place.elements,
-        frozenset(state.environment) if state.elements else place.elements,
-        standing if met is None else frozenset(met.names(state.elements)),
-        frozenset(drops(state, candidate)) if candidate else frozenset(),
-        state.round.split.letter_of if state.round and "partitions" in layers else {},
-        state.pinned if "pinned" in layers else frozenset(),
-        shown.selection,
-        sensed_order(state) if "sensed" in layers else {},
+        elements=frozenset(state.elements) or place.elements,
+        environment=frozenset(state.environment) if state.elements else place.elements,
+        shown=standing if met is None else frozenset(met.names(state.elements)),
+        dropped=frozenset(drops(state, candidate)) if candidate else frozenset(),
+        parts=state.round.split.letter_of if state.round and "partitions" in layers else {},
+        pinned=state.pinned if "pinned" in layers else frozenset(),
+        selected=shown.selection,
+        sensed=sensed_order(state) if "sensed" in layers else {},
     )
 
 
@@ -109,7 +109,7 @@ def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
     found, tones = np.unique(kinds * (len(HUES) + 1) + short + 1, return_inverse=True)
     mixes = [divmod(value, len(HUES) + 1) for value in found.tolist()]
     alike = tuple(palette.tone(kind, part - 1) for kind, part in mixes)
-    return Looks(kinds, tones.astype(np.int32), alike, palette, _signs(names, kinds, parts, who))
+    return Looks(kinds=kinds, tones=tones.astype(np.int32), looks=alike, palette=palette, signs=_signs(names, kinds, parts, who))
 
 
 @lru_cache(maxsize=4)

@@ -41,7 +41,7 @@ Limits = tuple[tuple[str, "np.ndarray"], ...]
 PATIENCE = 10.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
     """What the map shows besides the run, in m: where the robot starts (x, y, yaw), its goal and the models.
 
@@ -68,7 +68,7 @@ class Way:
     gone: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Shown:
     """All that a map shows: a world, the current state of its run, and the `candidate` whose models stand out.
 
@@ -140,7 +140,7 @@ def place_of(world: World, scenario: Scenario | None = None) -> Place:
 
     protected = frozenset(scenario.protected) if scenario else frozenset()
     movable = {model.name: model for model in world.models if not model.static}
-    place = Place(footprints(world), elements=frozenset(world.elements(protected)), movable=movable)
+    place = Place(prints=footprints(world), elements=frozenset(world.elements(protected)), movable=movable)
     if scenario is None:
         return place
     spawn = scenario.robot.spawn

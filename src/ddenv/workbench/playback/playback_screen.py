@@ -342,11 +342,11 @@ def way_of(one: Played, name: str) -> Way:
 
 def snapshot_with(state: RunState, there: Names, groups: tuple[Names, ...]) -> Snapshot:
     """The run as if these models were its environment, and these `groups` the parts of its round, each with a letter."""
-    round = Round(0, len(groups), Split(there, groups), PersistentTuple()) if groups else None
+    round = Round(number=0, n_partitions=len(groups), split=Split(environment=there, partitions=groups), candidates=PersistentTuple()) if groups else None
     bare = state.changed(environment=there, round=round, trials=(), pinned=frozenset(), supports=())
-    return Snapshot(bare, past=True)
+    return Snapshot(state=bare, past=True)
 
 
 def without(there: Names, gone: Collection[str]) -> Trial:
     """What the map takes for a candidate: the others of these models stand back, in small letters."""
-    return Trial(0, tuple(name for name in there if name not in gone), 0)
+    return Trial(number=0, models=tuple(name for name in there if name not in gone), node=0)

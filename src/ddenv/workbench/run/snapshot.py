@@ -61,7 +61,7 @@ class Moments:
     def of(self, moment: Moment, words: str) -> Snapshot:
         state = moment.after
         return Snapshot(
-            state,
+            state=state,
             evidence=self.path(state.evidence_test),
             spent=int(spent(state, state.updated_at)),
             original=self.path(None if state.f_test is None else state.f_test.id),

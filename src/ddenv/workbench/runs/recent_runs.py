@@ -59,7 +59,7 @@ class RunsFolder:
             read = last if last is not None and not read.stamp else read
             self._read[path] = read
         if read is None:
-            return Recent(path, stamp[0] / 1e9)
+            return Recent(path=path, changed=stamp[0] / 1e9)
         recent = read.recent
         if not recent.trouble and recent.status not in ENDED and not engine_is_alive(path):
             # A run without an engine does not change, so its state is not kept.
@@ -89,5 +89,5 @@ def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
             state = fold(file.events(state.revision if state else 0), state)
     except UserError as error:
         locked = isinstance(error, Busy) or LOCKED in str(error)
-        return _Read(() if locked else stamp, Recent(path, age, trouble=str(error)))
+        return _Read(() if locked else stamp, Recent(path=path, changed=age, trouble=str(error)))
     return _Read(stamp, recent_of(path, state, age), None if state.ended else state)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 GAP = 0.02
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Choice:
     """A world, and the `settings` that the form starts with: the scenario's own, or the defaults for a `bare` world.
 
@@ -134,7 +134,7 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
         # The scenario's own files may be elsewhere by now.
         with RunFile(path) as run:
             scenario, world, _ = read_parts(run)
-        return Choice(path, world, scenario, run=True)
+        return Choice(path=path, world=world, settings=scenario, run=True)
     bare = is_read_as_world(path)
     settings = scenario_for_world(path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0)) if bare else load_scenario(path)
     try:
@@ -145,4 +145,4 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
         element = Missing(error.name, remembered().get(error.name, ""), "not supported, left out", UNSUPPORTED)
         return replace(choice, missing=(*choice.missing, element))
     settings = settings.model_copy(update={"reading": reading_of(settings.reading, **chosen)})
-    return Choice(path, world, settings, bare, options=chosen, missing=missing)
+    return Choice(path=path, world=world, settings=settings, bare=bare, options=chosen, missing=missing)

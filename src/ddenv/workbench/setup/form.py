@@ -19,7 +19,7 @@ LONGEST_NUMBER = 10
 
 
 def _place(name: str, meaning: str, unit: str = "m", most: float = FARTHEST, more: str = "") -> Setting:
-    return Setting(None, meaning, unit, least=-most, most=most, more=more, name=name, kind=float)
+    return Setting(default=None, meaning=meaning, unit=unit, least=-most, most=most, more=more, name=name, kind=float)
 
 
 BASIC = (*(one for one in OPTIONS if one.shown == "basic"), JOBS)
@@ -33,9 +33,9 @@ GOAL = (_place("goal_x", "where the robot has to go"), _place("goal_y", "where t
 PLACES = (*SPAWN, *GOAL)
 ADVANCED = tuple(one for one in OPTIONS if one.shown == "more")
 NAMED = "the name of the run: a file in the runs folder, or a path that ends in .ddenv"
-NAME = Setting(None, NAMED, name="run_name")
+NAME = Setting(default=None, meaning=NAMED, name="run_name")
 ACCEPTED = "whether each reduction is accepted at once (automatic), or waits for you to accept or reject it (ask)"
-ACCEPT = Setting(None, ACCEPTED, name="accept", choices=("automatic", "ask"))
+ACCEPT = Setting(default=None, meaning=ACCEPTED, name="accept", choices=("automatic", "ask"))
 FIELDS = {one.name: one for one in (*BASIC, *PLACES, *ADVANCED, NAME, ACCEPT)}
 
 

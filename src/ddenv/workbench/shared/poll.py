@@ -113,11 +113,11 @@ class Poll:
             known = self._motions
             self._motions = {test: known[test] if test in known else self.file.motion(test) for test in ways if test}
             evidence, original = (self._motions.get(test or 0) for test in ways)
-            snapshot = Snapshot(state, live, engine, evidence, spent, error, original)
+            snapshot = Snapshot(state=state, live=live, engine=engine, evidence=evidence, spent=spent, error=error, original=original)
         except Busy:
             raise
         except UserError as trouble:
-            snapshot = Snapshot(state, (), engine, None, spent, error or str(trouble))
+            snapshot = Snapshot(state=state, live=(), engine=engine, evidence=None, spent=spent, error=error or str(trouble))
             due = True
         self._behind = more or not due
         self._catching_up = more

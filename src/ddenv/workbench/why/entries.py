@@ -31,7 +31,7 @@ NEAREST = "nearest world that passes"
 FIGURES = 23
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
     """Something that is left out of the environment of `snapshot`: the models `gone`, which have the sign `letter` on the map.
 
@@ -69,12 +69,12 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
             f"{rate(claim)}; {meaning(claim, certificate)}." if claim is not None and certificate is not None else ""
         )
         more = rates, parting_sentence(each)
-        models.append(Entry(each.without, sign, each.gone, sentence(each), more, each.parting, ways, snapshot, claim))
+        models.append(Entry(name=each.without, letter=sign, gone=each.gone, sentence=sentence(each), more=more, parting=each.parting, ways=ways, snapshot=snapshot, claim=claim))
     if (one := nearest(file, state)) is not None:
         # The whole world fails, and without these it passes.
         whole = snapshot_with(state, state.elements, (one.gone,) if one.gone else ())
         ways = ("fails", "passes")
-        last = [Entry(NEAREST, "A", one.gone, one.sentences, (), one.parting, ways, whole)]
+        last = [Entry(name=NEAREST, letter="A", gone=one.gone, sentence=one.sentences, more=(), parting=one.parting, ways=ways, snapshot=whole)]
     return (*models, *last, *_of_numbers(file, state)), len(found) - len(listed)
 
 
@@ -97,7 +97,7 @@ def _of_numbers(file: RunFile, state: RunState) -> Iterator[Entry]:
         limits = tuple((verdict, ring) for verdict, model, moved in one.limits for ring in rings(model, moved))
         figures = f"{'goal' if one.verdict == 'goal' else 'no f'} at {value}"
         ways = ("now", f"at {value}")
-        yield Entry(one.name, "", (), one.sentence, more, one.parting, ways, snapshot, None, limits, figures)
+        yield Entry(name=one.name, letter="", gone=(), sentence=one.sentence, more=more, parting=one.parting, ways=ways, snapshot=snapshot, claim=None, limits=limits, figures=figures)
 
 
 def head(width: int) -> Text:

@@ -21,7 +21,7 @@ STILL = 0.01
 MOVED = 0.001
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Saved:
     """The entry of one model in `<state>`; empty for the `element` of a model without one.
 
@@ -38,17 +38,17 @@ class Saved:
 def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context: Context) -> Model:
     """The model of `part`, called by the unique `name`, with its `entry` in `<state>`. Raises UserError, also TooFar."""
     context.model = name
-    saved = Saved(part.at) if entry is None else _saved(entry, context)
+    saved = Saved(element=part.at) if entry is None else _saved(entry, context)
     nominal = outer.placed(part)
     actual = nominal if saved.pose is None else saved.pose
-    spot = Spot(outer.inside(part), nominal, actual, static=_is_static(part))
+    spot = Spot(scope=outer.inside(part), nominal=nominal, actual=actual, static=_is_static(part))
     _check_has_link(part, spot.scope)
     builder = _Builder(context)
     builder.add(spot, saved)
     is_empty = not builder.links
     if is_empty:
         context.note("ignored", part.element, "it has no <link>: nothing can touch it")
-        builder.links.append(Link("link", actual, None, (), ()))
+        builder.links.append(Link(name="link", pose=actual, inertia=None, collisions=(), visuals=()))
     if entry is not None:
         _note_move(list(builder.poses.values()), saved, context)
     pulled = [truth(link, "gravity", True) for link in builder.elements]
@@ -137,18 +137,18 @@ class _Builder:
 
     def _add_part(self, part: Part, spot: Spot, outer: Saved) -> None:
         local = spot.scope.placed(part)
-        saved = outer.models.get(part.name, Saved(part.at))
+        saved = outer.models.get(part.name, Saved(element=part.at))
         there = spot.actual @ local if saved.pose is None else saved.pose
         before = len(self.links)
         prefix = spot.prefix if part.merged else f"{spot.prefix}{part.name}::"
         static = spot.static or (_is_static(part) and not part.merged)
         inner = spot.scope.inside(part)
         _check_has_link(part, inner)
-        self.add(Spot(inner, spot.nominal @ local, there, prefix, spot.scale, static), saved)
+        self.add(Spot(scope=inner, nominal=spot.nominal @ local, actual=there, prefix=prefix, scale=spot.scale, static=static), saved)
         if static and not spot.static:
             # A static model nested in a moving one: its links are welded to the world.
             links = self.links[before:]
-            self.joints += [Joint(f"{link.name} (static)", "fixed", WORLD, link.name, link.pose) for link in links]
+            self.joints += [Joint(name=f"{link.name} (static)", kind="fixed", parent=WORLD, child=link.name, pose=link.pose) for link in links]
 
 
 def _check_has_link(part: Part, scope: Scope) -> None:
@@ -199,7 +199,7 @@ def _saved(model: Element, context: Context) -> Saved:
             context.note("ignored", velocity, "every run starts at rest")
     links = {name_of(link): pose for link in model.findall("link") if (pose := _pose(link)) is not None}
     models = {name_of(inner): _saved(inner, context) for inner in model.findall("model")}
-    return Saved(model, _pose(model), factors, links, models)
+    return Saved(element=model, pose=_pose(model), scale=factors, links=links, models=models)
 
 
 def _pose(holder: Element) -> Pose | None:

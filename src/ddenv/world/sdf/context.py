@@ -83,7 +83,7 @@ INSIDE = frozenset(
 MOST_NAMED = 5
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
 
@@ -109,7 +109,7 @@ class Context:
 
     def note(self, kind: Literal["replaced", "ignored"], element: Element, why: str, detail: str = "") -> None:
         """Notes that `element` was replaced or ignored."""
-        self.notes.append(Note(kind, self.model, place(element), f"<{element.tag}>", why, detail))
+        self.notes.append(Note(kind=kind, model=self.model, place=place(element), what=f"<{element.tag}>", why=why, detail=detail))
 
     def note_tolerance(self, root: Element, text: bytes) -> None:
         """Notes what is no strict XML in `text`, the content of the file of `root`."""
@@ -118,7 +118,7 @@ class Context:
             return
         file = "/".join(root.source.parts[-2:])
         why = f"in {file}, {fault}; the file was read as Gazebo reads it"
-        self.notes.append(Note("ignored", self.model, place(root), "a fault of XML", why))
+        self.notes.append(Note(kind="ignored", model=self.model, place=place(root), what="a fault of XML", why=why))
 
     def note_unused(self, root: Element) -> None:
         """Notes the stand-ins that nothing asked for: probably typing errors."""

@@ -174,7 +174,7 @@ class Source:
         raise self.complain(node, f"expected a rotation !Rpy or !AngleAxis, found {node.tag[:40]}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Directive:
     """One directive: its `kind`, its values by key, and its place; `span` (start, end) are bytes of the outermost file."""
 
@@ -226,7 +226,7 @@ def _open(source: Source, files: tuple[Path, ...], context: Context, found: list
         ((kind, value),) = source.pairs(node).items()
         if kind not in KEYS:
             raise source.complain(node, f"unknown directive '{kind}'{nearest(kind, KEYS)}")
-        one = Directive(kind, source.keys(value, kind, KEYS[kind]), node, source, source.bytes_of((start, end)))
+        one = Directive(kind=kind, keys=source.keys(value, kind, KEYS[kind]), node=node, source=source, span=source.bytes_of((start, end)))
         if len(found) >= MOST:
             raise source.complain(node, f"more than {MOST} directives")
         found.append(one)

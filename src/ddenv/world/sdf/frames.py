@@ -34,7 +34,7 @@ class Scope:
         self.parts: list[Part] = []
         for child in element:
             if child.tag == "model":
-                self.parts.append(Part(child, child, name_of(child), files))
+                self.parts.append(Part(element=child, at=child, name=name_of(child), files=files))
             elif child.tag == "include" and (part := included(child, files, context)) is not None:
                 self.parts.append(part)
         self._context = context

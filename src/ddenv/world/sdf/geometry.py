@@ -48,7 +48,7 @@ ROUGH = "contact at the edges of those that are no boxes is rough"
 RANGE = f"sizes must be from {SMALLEST:g} to {LARGEST:g} m"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Lost:
     """A mesh that was not found, or is `unreadable`, and the reason; `word` is what the user wants in its place, as in `StandIn`.
 
@@ -139,7 +139,7 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
         text, stand_in = given
         if isinstance(stand_in, str):
             reason = "left out" if stand_in == NONE else f"the {stand_in} shapes replace it"
-            return Lost(element, uri, reason, stand_in)
+            return Lost(element=element, uri=uri, reason=reason, word=stand_in)
         context.note("replaced", element, f"'{uri}' by the stand-in {text}")
         return scaled(stand_in, scale, element)
     submesh = element.find("submesh")
@@ -153,7 +153,7 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
         mesh = context.resources.mesh(part, convex=False)
     except (Missing, Unusable) as error:
         word = AUTO if context.may_guess(uri) else ""
-        return Lost(element, uri, str(error), word, full, unreadable=isinstance(error, Unusable))
+        return Lost(element=element, uri=uri, reason=str(error), word=word, scale=full, unreadable=isinstance(error, Unusable))
     if mesh.simplified:
         context.note("replaced", element, f"'{uri}' by its convex hull, since it is too fine to be drawn")
     return Placed(_scaled(mesh, full, element))

@@ -21,7 +21,7 @@ NO_MODELS = {"actor": REASONS["actor"], "light": "nothing can touch it"}
 STAND_IN = "stand-in "
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Part:
     """A model inside another model or a world: its `<model>` (`element`), and the `<include>` that names it or itself (`at`).
 
@@ -84,7 +84,7 @@ def included(include: Element, files: tuple[Path, ...], context: Context) -> Par
     name = text_of(include.find("name")) or own
     # The name of its frame in libsdformat, which nothing else may have.
     name = f"_merged__{name}__model__" if merged else name
-    return Part(models[0], include, name, (*files, root.source), static, merged)
+    return Part(element=models[0], at=include, name=name, files=(*files, root.source), static=static, merged=merged)
 
 
 def _last_of(uri: str) -> str:

@@ -52,7 +52,7 @@ def opened(world: World, root: Element) -> World:
         if len(names) < len(parts) or not taken.isdisjoint(names):
             closed = "two of its parts, or a part and a model, have one name"
         if closed:
-            notes.append(Note("ignored", model.name, place(element), "--inside", f"it stays whole, since {closed}"))
+            notes.append(Note(kind="ignored", model=model.name, place=place(element), what="--inside", why=f"it stays whole, since {closed}"))
             models.append(model)
             continue
         taken |= names

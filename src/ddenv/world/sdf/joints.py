@@ -26,7 +26,7 @@ class LinkPose:
     actual: Pose
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Spot:
     """The place of a model or nested model with the frames `scope`: its own frame in the world, as in `LinkPose`.
 

@@ -86,7 +86,7 @@ def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local:
         elif isinstance(item.shape, Placed) and item.element.tag == "visual":
             place = pose @ item.pose @ item.shape.offset
             visuals.append(Visual(name_of(item.element), item.shape.shape, place, read_color(item.element)))
-    return Link(spot.prefix + name_of(element), pose, inertia, tuple(collisions), tuple(visuals))
+    return Link(name=spot.prefix + name_of(element), pose=pose, inertia=inertia, collisions=tuple(collisions), visuals=tuple(visuals))
 
 
 @dataclass(frozen=True)
@@ -106,8 +106,8 @@ def _collisions(item: _Item, placed: Placed, pose: Pose, context: Context) -> li
     place = pose @ item.pose @ placed.offset
     name = name_of(item.element)
     if not isinstance(placed.shape, Mesh) or not placed.pieces:
-        return [Collision(name, placed.shape, place, mu)]
-    return [Collision(name, shape, place @ offset, mu, Piece(placed.shape, offset)) for shape, offset in placed.pieces]
+        return [Collision(name=name, shape=placed.shape, pose=place, mu=mu)]
+    return [Collision(name=name, shape=shape, pose=place @ offset, mu=mu, piece=Piece(placed.shape, offset)) for shape, offset in placed.pieces]
 
 
 def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -> Placed | None:

@@ -93,7 +93,7 @@ OF_SCENARIO |= {f"sensors.{name}": (_ERROR, ("sensors", name)) for name in _NOIS
 OPTIONS = "controller.options."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Number:
     """A number that may be changed: its value `now`, and the `low`est and `high`est value that are tried, in `unit`.
 
@@ -136,7 +136,7 @@ def numbers_of(scenario: Scenario, world: World, robot: Model, kept: Iterable[st
     for kind, name, now in ((kind, name, float(value)) for kind, name, value in values if value is not None):
         low, high = (float(f"{end:.9g}") for end in kind.range(now, length))
         resolution = max(kind.matters, 0.0 if kind in (_PLACE, _HEIGHT, _ANGLE) else PART * abs(now))
-        found[name] = Number(name, now, low, high, max(high - now, now - low), resolution, kind.unit)
+        found[name] = Number(name=name, now=now, low=low, high=high, scale=max(high - now, now - low), resolution=resolution, unit=kind.unit)
     return found
 
 

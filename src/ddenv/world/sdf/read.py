@@ -38,7 +38,7 @@ def read_world(path: Path, reading: Reading = PLAIN) -> World:
 
 def parse_world(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> World:
     """The world in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
-    context = Context(resources or disk_of(path, reading), reading)
+    context = Context(resources=resources or disk_of(path, reading), reading=reading)
     try:
         return parse_directives(text, path, context) if is_directives(path) else _world(text, path, context)
     except UserError:
@@ -56,7 +56,7 @@ def read_model(path: Path, reading: Reading = PLAIN) -> Model:
 
 def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> Model:
     """The one model in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
-    context = Context(resources or disk_of(path, reading), reading)
+    context = Context(resources=resources or disk_of(path, reading), reading=reading)
     scope = Scope(root_of(text, path, context), (path,), context)
     if len(scope.parts) != 1:
         raise UserError(f"{path}: expected one <model> inside <sdf>, found {len(scope.parts)}")

@@ -46,7 +46,7 @@ class Frame:
     owners: frozenset[str] = frozenset()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Fixing:
     """What places a group of links: its frame `own` stands at `pose` in the frame `base`, by a weld or as a free body."""
 
@@ -57,7 +57,7 @@ class Fixing:
     weld: bool
 
 
-@dataclass
+@dataclass(kw_only=True)
 class _Builder:
     """The models, frames and welds so far, by the names that Drake gives them."""
 
@@ -95,7 +95,7 @@ class _Builder:
                 _, pose = source.pose(keys.get("X_PC"), with_base=False)
                 if not child.model:
                     raise source.complain(keys["child"], "the world cannot be welded to a model; make it the parent")
-                self._fix(Fixing(child, parent, pose, partial(source.complain, one.node), weld=True))
+                self._fix(Fixing(own=child, base=parent, pose=pose, complain=partial(source.complain, one.node), weld=True))
                 for owner in child.owners:
                     self.spans[owner].append(one.span)
             case "add_collision_filter_group":
@@ -156,7 +156,7 @@ class _Builder:
                 raise source.complain(value, f"there is no body '{body}' in '{name}'")
             base, pose = source.pose(value)
             there = Frame() if base is None else self._frame(base, source)
-            self._fix(Fixing(frame, there, pose, partial(source.complain, value), weld=False))
+            self._fix(Fixing(own=frame, base=there, pose=pose, complain=partial(source.complain, value), weld=False))
 
     def _frame(self, node: Node, source: Source) -> Frame:
         """The frame that `node` names. Raises UserError."""
@@ -252,7 +252,7 @@ class _Builder:
                 continue
             at = fixing.own.link
             joints = _hung_from(at, joints)
-            weld = Joint(f"{at} (weld)", "fixed", WORLD, at, self._pose(base))
+            weld = Joint(name=f"{at} (weld)", kind="fixed", parent=WORLD, child=at, pose=self._pose(base))
             if base.model == name:
                 joints.append(replace(weld, parent=base.link))
             elif base.model and not _holds(self.finish(base.model), base.link):
@@ -356,7 +356,7 @@ def parse_directives(text: bytes, path: Path, context: Context) -> World:
     Its text is that of the file; if that opens others, with their directives in place of `add_directives`.
     """
     found, flat = opened(text, path, context)
-    builder = _Builder(context)
+    builder = _Builder(context=context)
     for one in found:
         builder.take(one)
     models = builder.all()
@@ -364,7 +364,7 @@ def parse_directives(text: bytes, path: Path, context: Context) -> World:
     context.complain_of_missing()
     if flat is not None:
         # Again, for the places in that text; what is wrong was said with the places in the files.
-        return parse_directives(flat, path, Context(context.resources, context.reading))
+        return parse_directives(flat, path, Context(resources=context.resources, reading=context.reading))
     going = {span for spans in builder.spans.values() for span in spans} | {one.span for one in builder.filters}
     if models and text[found[0].span[0] :].startswith(b"-") and all(one.span in going for one in found):
         # Drake takes an empty list, but not a missing one.
