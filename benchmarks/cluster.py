@@ -67,7 +67,20 @@ class Simulated:
         self.clock, test, fails, seed = heapq.heappop(self.running)
         rows = np.zeros((2, 8))
         rows[:, 4], rows[1, :2] = 1, (1, 2 if fails else 4)
-        return [(test, RunResult(outcome="failed" if fails else "pass", failure="stuck" if fails else "", trajectory=rows, motions={}, simulated_seconds=1.0, wall_seconds=0.01, seed=seed))]
+        return [
+            (
+                test,
+                RunResult(
+                    outcome="failed" if fails else "pass",
+                    failure="stuck" if fails else "",
+                    trajectory=rows,
+                    motions={},
+                    simulated_seconds=1.0,
+                    wall_seconds=0.01,
+                    seed=seed,
+                ),
+            )
+        ]
 
     def settle(self, elements: frozenset[str]):
         return lambda: Start([], Settled())
@@ -85,7 +98,10 @@ def reduce(folder: Path, models: int, workers: int) -> tuple[Simulated, float, i
     world.write_text(world_of(models))
     create_run(scenario_for_world(world, (-2, -2, 0.2, 0.8), (models, models)), path)
     chosen = random.Random(1).sample(range(models), NEEDED)
-    pool, began = Simulated(workers, frozenset(f"crate {number}" for number in chosen)), time.perf_counter()
+    pool, began = (
+        Simulated(workers, frozenset(f"crate {number}" for number in chosen)),
+        time.perf_counter(),
+    )
     with RunFile(path) as file:
         scenario, parsed, _ = read_parts(file)
         file.own()
@@ -102,7 +118,9 @@ def main() -> None:
     parser.add_argument("--models", type=int, default=200)
     parser.add_argument("--workers", default="1,8,64,512")
     options = parser.parse_args()
-    print("| workers | tests | for nothing | simulated h | times as fast | busy | engine, ms a test |")
+    print(
+        "| workers | tests | for nothing | simulated h | times as fast | busy | engine, ms a test |"
+    )
     print("|---|---|---|---|---|---|---|")
     first = 0.0
     with tempfile.TemporaryDirectory() as folder:

@@ -41,10 +41,17 @@ Both = tuple[RunResult, RunResult]
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument(
-        "--scenario", action="append", default=[], help="a bundled name or a YAML file; may be repeated"
+        "--scenario",
+        action="append",
+        default=[],
+        help="a bundled name or a YAML file; may be repeated",
     )
-    parser.add_argument("--world", action="append", default=[], help="FILE:SPAWN:GOAL; may be repeated")
-    parser.add_argument("--model-path", action="append", default=[], type=Path, help="a folder with models")
+    parser.add_argument(
+        "--world", action="append", default=[], help="FILE:SPAWN:GOAL; may be repeated"
+    )
+    parser.add_argument(
+        "--model-path", action="append", default=[], type=Path, help="a folder with models"
+    )
     parser.add_argument("--time-step", type=float, help="of worlds, s")
     parser.add_argument("--environments", type=int, default=100, help="random parts of each world")
     parser.add_argument("--seeds", type=int, default=4, help="runs of each part")
@@ -54,7 +61,9 @@ def main() -> None:
     options = parser.parse_args()
     scenarios = [load_scenario(find_scenario(name)) for name in options.scenario]
     scenarios += [of_world(text, options.model_path, options.time_step) for text in options.world]
-    print("| world | tests | ended early | verdicts that differ | at most (95 %) | moved | simulated time |")
+    print(
+        "| world | tests | ended early | verdicts that differ | at most (95 %) | moved | simulated time |"
+    )
     print("|---|---|---|---|---|---|---|", flush=True)
     total: list[tuple[Both, Failure]] = []
     for scenario in scenarios or [load_scenario(find_scenario("ditch"))]:
@@ -80,7 +89,9 @@ def of_world(text: str, folders: list[Path], time_step: float | None) -> Scenari
 def measured(scenario: Scenario, options: argparse.Namespace) -> list[tuple[Both, Failure]]:
     world, _ = load_parts(scenario)
     elements = world.elements(frozenset(scenario.protected))
-    whole = [(frozenset(elements), seed_of(scenario.reduction, run)) for run in range(options.baseline)]
+    whole = [
+        (frozenset(elements), seed_of(scenario.reduction, run)) for run in range(options.baseline)
+    ]
     asked = tests(elements, options.environments, options.seeds, scenario.reduction)
     until = time.monotonic() + options.seconds
     with multiprocessing.get_context("spawn").Pool(options.jobs, prepare, (scenario,)) as pool:
@@ -97,10 +108,15 @@ def in_time(asked: list[Asked], until: float) -> Iterator[Asked]:
     return (one for one in asked if time.monotonic() < until)
 
 
-def tests(elements: tuple[str, ...], environments: int, seeds: int, reduction: Reduction) -> list[Asked]:
+def tests(
+    elements: tuple[str, ...], environments: int, seeds: int, reduction: Reduction
+) -> list[Asked]:
     """Random parts of all sizes, each with the first seeds of the reduction."""
     chance = random.Random(0)
-    parts = [frozenset(chance.sample(elements, chance.randint(1, len(elements)))) for _ in range(environments)]
+    parts = [
+        frozenset(chance.sample(elements, chance.randint(1, len(elements))))
+        for _ in range(environments)
+    ]
     return [(part, seed_of(reduction, run)) for part in parts for run in range(seeds)]
 
 
@@ -125,7 +141,17 @@ def both_runs(asked: Asked, ends: Ends) -> Both:
 def fixed(scenario: Scenario, results: list[RunResult]) -> Failure:
     """f as the engine fixes it from the runs of the whole world."""
     ran = [
-        Test(id=number, environment=0, phase="baseline", round=None, candidate=None, run=number, seed=result.seed, outcome=result.outcome, end_pose=result.end_pose)
+        Test(
+            id=number,
+            environment=0,
+            phase="baseline",
+            round=None,
+            candidate=None,
+            run=number,
+            seed=result.seed,
+            outcome=result.outcome,
+            end_pose=result.end_pose,
+        )
         for number, result in enumerate(results)
     ]
     trajectories = {number: result.trajectory for number, result in enumerate(results)}

@@ -55,31 +55,52 @@ reduction: """
 class Sleeper:
     """A simulator whose tests sleep for some s, and fail where all needed crates are there."""
 
-    def __init__(self, log: Path, seconds: float, scenario: Scenario, world: World, robot: Model) -> None:
+    def __init__(
+        self, log: Path, seconds: float, scenario: Scenario, world: World, robot: Model
+    ) -> None:
         crates = len(world.elements())
         self._needed = {f"crate {crates * place // (NEEDED + 1)}" for place in range(1, NEEDED + 1)}
         self._seconds = seconds
         self._log = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
 
     def run(
-        self, keep: frozenset[str], seed: int, progress: Progress | None = None, ends: Ends | None = None
+        self,
+        keep: frozenset[str],
+        seed: int,
+        progress: Progress | None = None,
+        ends: Ends | None = None,
     ) -> RunResult:
         began = time.monotonic()
         time.sleep(self._seconds)
         failed = keep.issuperset(self._needed)
         way = np.zeros((450, 8))
-        way[:, 0], way[:, 1], way[:, 4] = np.arange(450) / 10, np.linspace(-2, 1 if failed else 9, 450), 1
+        way[:, 0], way[:, 1], way[:, 4] = (
+            np.arange(450) / 10,
+            np.linspace(-2, 1 if failed else 9, 450),
+            1,
+        )
         seen = {f"crate {number}": 1.0 + number for number in range(10)}
         result = RunResult(
-            outcome="failed" if failed else "pass", failure="stuck" if failed else "", trajectory=way, motions={}, simulated_seconds=45.0, wall_seconds=self._seconds, seed=seed, first_sensed=seen
+            outcome="failed" if failed else "pass",
+            failure="stuck" if failed else "",
+            trajectory=way,
+            motions={},
+            simulated_seconds=45.0,
+            wall_seconds=self._seconds,
+            seed=seed,
+            first_sensed=seen,
         )
         os.write(self._log, f"{os.getpid()} {began} {time.monotonic()}\n".encode())
         return result
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--robot", action="store_true", help="one worker, two, and two of Dask, on friction")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--robot", action="store_true", help="one worker, two, and two of Dask, on friction"
+    )
     parser.add_argument("--long", type=int, default=10_000, help="tests of the long run")
     options = parser.parse_args()
     print("| tests of | models | workers | tests | between tests, ms | own work, ms |")
@@ -94,7 +115,9 @@ def main() -> None:
     ):
         with tempfile.TemporaryDirectory() as folder:
             print(row(Path(folder), seconds, models, jobs, more), flush=True)
-    print(f"\n| tests in the run | resumed after, s |\n|---|---|\n| {options.long:,} | {resumed(options.long):.2f} |")
+    print(
+        f"\n| tests in the run | resumed after, s |\n|---|---|\n| {options.long:,} | {resumed(options.long):.2f} |"
+    )
     if options.robot:
         robot()
 
@@ -119,7 +142,9 @@ def row(folder: Path, seconds: float, models: int, jobs: int, more: dict[str, ob
     create_run(load_scenario(folder / "scenario.yaml"), run)
     spent = work(run, jobs, partial(Sleeper, log, seconds))
     tests = sorted(tuple(map(float, line.split())) for line in log.read_text().splitlines())
-    gaps = [1000 * (after[1] - before[2]) for before, after in pairwise(tests) if before[0] == after[0]]
+    gaps = [
+        1000 * (after[1] - before[2]) for before, after in pairwise(tests) if before[0] == after[0]
+    ]
     between = f"{np.percentile(gaps, 50):.1f} / {np.mean(gaps):.1f} / {np.percentile(gaps, 95):.1f}"
     own = 1000 * spent / len(tests)
     return f"| {seconds:g} s | {models:,} | {jobs} | {len(tests):,} | {between} | {own:.1f} |"
@@ -131,8 +156,13 @@ def work(run: Path, jobs: int, make: partial[Sleeper]) -> float:
         scenario, world, robot = read_parts(file)
         file.own()
         journal = Journal(file)
-        journal.record(EngineStarted(pid=os.getpid(), jobs=jobs, version=__version__, simulator="none"))
-        control, pool = Control(journal, threading.Event()), Pool(scenario, world, robot, jobs, make)
+        journal.record(
+            EngineStarted(pid=os.getpid(), jobs=jobs, version=__version__, simulator="none")
+        )
+        control, pool = (
+            Control(journal, threading.Event()),
+            Pool(scenario, world, robot, jobs, make),
+        )
         driver = Driver(scenario, world, journal, Bench(journal, pool, control), control)
         began = time.thread_time()
         with suppress(Stopped):

@@ -38,9 +38,15 @@ def main() -> None:
     with ProcessPoolExecutor(arguments.jobs, mp_context=get_context("spawn")) as pool:
         for name in arguments.scenarios.split(","):
             for repaired in (False, True):
-                shares = [range(arguments.seeds)[job :: arguments.jobs] for job in range(arguments.jobs)]
+                shares = [
+                    range(arguments.seeds)[job :: arguments.jobs] for job in range(arguments.jobs)
+                ]
                 asked = [(name, repaired, seeds) for seeds in shares]
-                results = [result for share in pool.map(runs, *zip(*asked, strict=True)) for result in share]
+                results = [
+                    result
+                    for share in pool.map(runs, *zip(*asked, strict=True))
+                    for result in share
+                ]
                 print(row(name, repaired, results), flush=True)
 
 
@@ -69,8 +75,15 @@ def row(name: str, repaired: bool, results: list[RunResult]) -> str:
     if failed:
         epsilon = load_scenario(SCENARIOS / f"{name}.yaml").failure.epsilon
         similar = len(alike([result.end_pose[:3] for result in failed], epsilon)[0])
-    kinds = ", ".join(f"{count} {kind}" for kind, count in Counter(one.failure for one in failed).most_common())
-    cells = [name, "repaired" if repaired else "whole", share(len(failed), len(results)), share(similar, len(results))]
+    kinds = ", ".join(
+        f"{count} {kind}" for kind, count in Counter(one.failure for one in failed).most_common()
+    )
+    cells = [
+        name,
+        "repaired" if repaired else "whole",
+        share(len(failed), len(results)),
+        share(similar, len(results)),
+    ]
     return f"| {' | '.join(cells)} | {kinds or '-'} |"
 
 

@@ -40,7 +40,10 @@ def steady(rate: float, needed: int, spurious: float = 0.0) -> Callable[[list[st
 
     def make(drawn: list[str]) -> Oracle:
         all_needed = frozenset(drawn[:needed])
-        return Oracle(lambda kept: spurious + (1 - spurious) * rate if kept >= all_needed else spurious, all_needed)
+        return Oracle(
+            lambda kept: spurious + (1 - spurious) * rate if kept >= all_needed else spurious,
+            all_needed,
+        )
 
     return make
 
@@ -50,7 +53,11 @@ def drifting(low: float) -> Callable[[list[str]], Oracle]:
 
     def make(drawn: list[str]) -> Oracle:
         needed, boards = frozenset(drawn[:1]), frozenset(drawn[1:3])
-        return Oracle(lambda kept: (0.0, low, 1.0)[len(boards & kept)] if kept >= needed else 0.0, needed, boards)
+        return Oracle(
+            lambda kept: (0.0, low, 1.0)[len(boards & kept)] if kept >= needed else 0.0,
+            needed,
+            boards,
+        )
 
     return make
 
@@ -60,7 +67,9 @@ def like_rubble(drawn: list[str]) -> Oracle:
     needed, (one, other) = frozenset(drawn[:1]), drawn[1:3]
     rates = {(True, True): 0.97, (False, True): 0.6, (True, False): 0.25, (False, False): 0.15}
     return Oracle(
-        lambda kept: rates[one in kept, other in kept] if kept >= needed else 0.0, needed, frozenset({one, other})
+        lambda kept: rates[one in kept, other in kept] if kept >= needed else 0.0,
+        needed,
+        frozenset({one, other}),
     )
 
 
@@ -69,7 +78,11 @@ def graded(factor: float) -> Callable[[list[str]], Oracle]:
 
     def make(drawn: list[str]) -> Oracle:
         needed, useful = frozenset(drawn[:1]), frozenset(drawn[1:6])
-        return Oracle(lambda kept: 0.95 * factor ** len(useful - kept) if kept >= needed else 0.0, needed, useful)
+        return Oracle(
+            lambda kept: 0.95 * factor ** len(useful - kept) if kept >= needed else 0.0,
+            needed,
+            useful,
+        )
 
     return make
 
@@ -152,15 +165,22 @@ def reduction(task: Task) -> list[float]:
         found.baseline_tests,
         found.search_tests,
         found.certificate_tests,
-        100.0 * (true_rate(None) < CERTIFY_RATE * oracle.rate(whole) - ROUNDING) if "kept" in said else nan,
+        100.0 * (true_rate(None) < CERTIFY_RATE * oracle.rate(whole) - ROUNDING)
+        if "kept" in said
+        else nan,
         100.0 * any(true_rate(claim.without) > most for claim in needed) if needed else nan,
-        100.0 * fmean(claim.low <= true_rate(claim.without) <= claim.high for claim in claims) if claims else nan,
+        100.0 * fmean(claim.low <= true_rate(claim.without) <= claim.high for claim in claims)
+        if claims
+        else nan,
     ]
 
 
 def cells(results: Sequence[Sequence[float]]) -> list[str]:
     """The mean of each column, over the reductions that have a value."""
-    means = [float(np.nanmean(column)) if not np.isnan(column).all() else None for column in np.transpose(results)]
+    means = [
+        float(np.nanmean(column)) if not np.isnan(column).all() else None
+        for column in np.transpose(results)
+    ]
     return [
         ""
         if mean is None
@@ -188,7 +208,9 @@ def main() -> None:
             for rule in ("first", "kept"):
                 if options.rule not in (None, rule):
                     continue
-                tasks = [Task(name, rule, options.algorithm, seed) for seed in range(options.reductions)]
+                tasks = [
+                    Task(name, rule, options.algorithm, seed) for seed in range(options.reductions)
+                ]
                 results = pool.map(reduction, tasks, chunksize=4)
                 print(f"| {name} | {rule} | " + " | ".join(cells(results)) + " |", flush=True)
 

@@ -63,7 +63,12 @@ def places(scenario: Scenario, world: World) -> Iterator[tuple[float, float]]:
 
 def ground_of(world: World) -> Pose:
     """Where the world's plane lies."""
-    return next(one.pose for model in world.models for one in model.collisions if isinstance(one.shape, Plane))
+    return next(
+        one.pose
+        for model in world.models
+        for one in model.collisions
+        if isinstance(one.shape, Plane)
+    )
 
 
 def height(ground: Pose, x: float, y: float) -> float:
@@ -72,7 +77,9 @@ def height(ground: Pose, x: float, y: float) -> float:
     return float(pz - ((x - px) * nx + (y - py) * ny) / nz)
 
 
-def still(name: str, size: tuple[float, float, float], x: float, y: float, z: float, yaw: float) -> str:
+def still(
+    name: str, size: tuple[float, float, float], x: float, y: float, z: float, yaw: float
+) -> str:
     """A box that never moves and stands on `z` (m)."""
     box = f"<box><size>{size[0]} {size[1]} {size[2]}</size></box>"
     link = f'<link name="link"><collision name="box"><geometry>{box}</geometry></collision></link>'
@@ -82,8 +89,15 @@ def still(name: str, size: tuple[float, float, float], x: float, y: float, z: fl
 def board(number: int, x: float, y: float, z: float, yaw: float) -> str:
     """A loose board."""
     a, b, c = SIZE
-    inertia = [MASS * (b * b + c * c) / 12, MASS * (a * a + c * c) / 12, MASS * (a * a + b * b) / 12]
-    moments = "".join(f"<{name}>{value}</{name}>" for name, value in zip(("ixx", "iyy", "izz"), inertia, strict=True))
+    inertia = [
+        MASS * (b * b + c * c) / 12,
+        MASS * (a * a + c * c) / 12,
+        MASS * (a * a + b * b) / 12,
+    ]
+    moments = "".join(
+        f"<{name}>{value}</{name}>"
+        for name, value in zip(("ixx", "iyy", "izz"), inertia, strict=True)
+    )
     return (
         f'<model name="board_{number}"><pose>{x} {y} {z} 0 0 {yaw}</pose><link name="link"><inertial><mass>{MASS}</mass>'
         f'<inertia>{moments}</inertia></inertial><collision name="c"><geometry><box><size>{a} {b} {c}</size></box></geometry>'

@@ -33,7 +33,13 @@ import ddenv
 
 SIZES = tuple((n, k) for n in (43, 100, 200) for k in (2, 5))
 SHRINK_RAY = "Shrink Ray"
-COLUMNS = ("splitting", "ddenv", "probdd", "ddmin", *((SHRINK_RAY,) if find_spec("shrinkray") else ()))
+COLUMNS = (
+    "splitting",
+    "ddenv",
+    "probdd",
+    "ddmin",
+    *((SHRINK_RAY,) if find_spec("shrinkray") else ()),
+)
 Test = Callable[[frozenset[str]], bool]
 
 
@@ -91,7 +97,9 @@ def by_ddenv(world: World, test: Test, algorithm: str, seed: int) -> Ending:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = ddenv.reduce(world.elements, test, algorithm=algorithm, seed=seed, **world.evidence)
-    return Ending(found.tests, frozenset(found.kept), found.claims[0].verdict if found.claims else "")
+    return Ending(
+        found.tests, frozenset(found.kept), found.claims[0].verdict if found.claims else ""
+    )
 
 
 def by_shrink_ray(world: World, test: Test, seed: int) -> Ending:
@@ -123,7 +131,11 @@ def by_shrink_ray(world: World, test: Test, seed: int) -> Ending:
     whole = "\n".join(world.elements).encode()
     history = [whole]
     problem = BasicReductionProblem(
-        whole, fails, WorkContext(random=random.Random(seed)), policy=NondeterminismPolicy(), history=history
+        whole,
+        fails,
+        WorkContext(random=random.Random(seed)),
+        policy=NondeterminismPolicy(),
+        history=history,
     )
     problem.on_reduce(remember)
     reducer = ShrinkRay(
@@ -168,17 +180,29 @@ def one(task: Task) -> tuple[float, ...] | None:
             ending = by_ddenv(world, test, task.column, task.seed)
     except ddenv.UserError:
         return None
-    useful = set(more[:5]) if failure.less < 1.0 else set(more[:2]) if failure.drifts < 1.0 else set()
-    share = failure.in_kept(ending.left, world, more) / failure.in_kept(frozenset(world.elements), world, more)
+    useful = (
+        set(more[:5]) if failure.less < 1.0 else set(more[:2]) if failure.drifts < 1.0 else set()
+    )
+    share = failure.in_kept(ending.left, world, more) / failure.in_kept(
+        frozenset(world.elements), world, more
+    )
     not_shown = ending.verdict not in ("", "kept")
-    return calls, ending.left >= world.needed, ending.left <= world.needed | useful, share, not_shown
+    return (
+        calls,
+        ending.left >= world.needed,
+        ending.left <= world.needed | useful,
+        share,
+        not_shown,
+    )
 
 
 def cell(results: list[tuple[float, ...] | None]) -> str:
     ended = [result for result in results if result is not None]
     if not ended:
         return "never showed"
-    calls, needed, nothing_needless, share, not_shown = (list(column) for column in zip(*ended, strict=True))
+    calls, needed, nothing_needless, share, not_shown = (
+        list(column) for column in zip(*ended, strict=True)
+    )
     words = f"{fmean(calls):,.0f} ({max(calls):,}) {100 * fmean(needed):.0f}/{100 * fmean(nothing_needless):.0f}"
     words += f" {fmean(share):.2f}"
     words += f", {100 * fmean(not_shown):.0f} % not shown" if any(not_shown) else ""

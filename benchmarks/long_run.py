@@ -66,7 +66,11 @@ def write(path: Path, tests: int, models: int) -> None:
         "world": "crates.sdf",
         "robot": {"model": "robot.sdf", "spawn": {"x": -2.0, "y": -2.0, "z": 0.2, "yaw": 0.8}},
         "goal": {"x": width + 2, "y": width + 2},
-        "reduction": {"pair": "model2model/failure-proximal", "iterations": RUNS - 1, "baseline_runs": RUNS},
+        "reduction": {
+            "pair": "model2model/failure-proximal",
+            "iterations": RUNS - 1,
+            "baseline_runs": RUNS,
+        },
     }
     elements = list(parse_world(world, path).elements())
     documents = {"scenario": json.dumps(data).encode(), "world": world, "robot": ROBOT_SDF.encode()}
@@ -96,7 +100,18 @@ def way(width: float) -> bytes:
     rows = array("d")
     for number in range(450):
         along = -2 + (width / 2 + 2) * number / 449
-        rows.extend((number / 10, along, along + math.sin(along / 3), 0.2, math.cos(0.4), 0.0, 0.0, math.sin(0.4)))
+        rows.extend(
+            (
+                number / 10,
+                along,
+                along + math.sin(along / 3),
+                0.2,
+                math.cos(0.4),
+                0.0,
+                0.0,
+                math.sin(0.4),
+            )
+        )
     return rows.tobytes()
 
 
@@ -107,32 +122,75 @@ def events(tests: int, models: int, width: float) -> Iterator[Event]:
         yield TestStarted(test=test, environment=0, run=test - 1, seed=test - 1, phase="baseline")
         yield ended(test, "similar", width)
     judged = Outcomes(dict.fromkeys(runs, "similar"), dict.fromkeys(runs, 0.1))
-    yield BaselineFinished(runs=RUNS, failures=RUNS, rate=1.0, low=0.51, high=1.0, failure_test=1, position=(width / 2, width / 2, 0.2), miss_chance=0.0, iterations_95=0, judged=judged)
+    yield BaselineFinished(
+        runs=RUNS,
+        failures=RUNS,
+        rate=1.0,
+        low=0.51,
+        high=1.0,
+        failure_test=1,
+        position=(width / 2, width / 2, 0.2),
+        miss_chance=0.0,
+        iterations_95=0,
+        judged=judged,
+    )
     kept, here, environments, test, number = list(range(models)), 0, 1, RUNS + 1, 0
     while test <= tests:
         number += 1
-        parts = [tuple(kept[len(kept) * part // PARTS : len(kept) * (part + 1) // PARTS]) for part in range(PARTS)]
-        kinds = [(kind, part, 0.5 + part) for part in range(PARTS) for kind in ("partition", "complement")]
-        yield RoundStarted(round=number, n_partitions=PARTS, environment=here, partitions=tuple(parts), candidates=tuple(kinds))
+        parts = [
+            tuple(kept[len(kept) * part // PARTS : len(kept) * (part + 1) // PARTS])
+            for part in range(PARTS)
+        ]
+        kinds = [
+            (kind, part, 0.5 + part)
+            for part in range(PARTS)
+            for kind in ("partition", "complement")
+        ]
+        yield RoundStarted(
+            round=number,
+            n_partitions=PARTS,
+            environment=here,
+            partitions=tuple(parts),
+            candidates=tuple(kinds),
+        )
         whole = Environment.of(kept)
         for candidate, (kind, part, _) in enumerate(kinds):
             runs = RUNS if candidate < 2 * PARTS - 1 else 1
             some = Environment.of(parts[part])
-            yield EnvironmentNamed(environment=environments, models=some if kind == "partition" else whole - some)
+            yield EnvironmentNamed(
+                environment=environments, models=some if kind == "partition" else whole - some
+            )
             yield from tried(number, candidate, environments, range(test, test + runs), width)
             test, environments = test + runs, environments + 1
         kept, here = [model for part in parts[:-1] for model in part], environments - 1
-        yield Reduced(round=number, candidate=2 * PARTS - 1, environment=here, evidence_test=test - 1)
+        yield Reduced(
+            round=number, candidate=2 * PARTS - 1, environment=here, evidence_test=test - 1
+        )
         yield RoundFinished(round=number)
 
 
-def tried(round: int, candidate: int, environment: int, tests: range, width: float) -> Iterator[Event]:
+def tried(
+    round: int, candidate: int, environment: int, tests: range, width: float
+) -> Iterator[Event]:
     """All tests of a candidate, and its verdict: similar if there is but one."""
     similar = len(tests) == 1
     for run, test in enumerate(tests):
-        yield TestStarted(test=test, environment=environment, run=run, seed=run, phase="round", round=round, candidate=candidate)
+        yield TestStarted(
+            test=test,
+            environment=environment,
+            run=run,
+            seed=run,
+            phase="round",
+            round=round,
+            candidate=candidate,
+        )
         yield ended(test, "similar" if similar else "other" if run % 2 else "pass", width)
-    yield CandidateJudged(round=round, candidate=candidate, verdict="similar" if similar else "dissimilar", tests=tuple(tests))
+    yield CandidateJudged(
+        round=round,
+        candidate=candidate,
+        verdict="similar" if similar else "dissimilar",
+        tests=tuple(tests),
+    )
 
 
 def ended(test: int, outcome: Outcome, width: float) -> TestFinished:

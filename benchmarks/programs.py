@@ -62,7 +62,9 @@ class Terminal:
 
     def letters(self) -> int:
         """How many letters and digits were written."""
-        return len(re.findall(rb"[A-Za-z0-9]", ESCAPES.sub(b"", b"".join(text for _, text in self.writes))))
+        return len(
+            re.findall(rb"[A-Za-z0-9]", ESCAPES.sub(b"", b"".join(text for _, text in self.writes)))
+        )
 
     def press(self, key: str) -> float:
         """Returns when."""
@@ -88,7 +90,13 @@ def largest(session: int) -> Iterator[list[float]]:
 
     def look() -> None:
         while not done.wait(0.2):
-            found.append(sum(memory_of(process) for process in Path("/proc").glob("[0-9]*") if of(process, session)))
+            found.append(
+                sum(
+                    memory_of(process)
+                    for process in Path("/proc").glob("[0-9]*")
+                    if of(process, session)
+                )
+            )
 
     thread = threading.Thread(target=look)
     thread.start()

@@ -49,16 +49,24 @@ class Reduced:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("settings", nargs="*", metavar="SETTING=VALUE")
     parser.add_argument("--scenarios", default="ditch,friction")
-    parser.add_argument("--pairs", default="paper", help="with commas; paper: those of its tables; own: the scenario's")
+    parser.add_argument(
+        "--pairs",
+        default="paper",
+        help="with commas; paper: those of its tables; own: the scenario's",
+    )
     parser.add_argument("--models", default="", help="sizes of the worlds, with commas")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--search-only", action="store_true")
     parser.add_argument("--keep", type=Path, help="a folder for worlds and run files")
     options = parser.parse_args()
-    print("| scenario | pair | models | after the slice | left | search | all | CPU s | clock, s | memory, MB |")
+    print(
+        "| scenario | pair | models | after the slice | left | search | all | CPU s | clock, s | memory, MB |"
+    )
     print("|---|---|---|---|---|---|---|---|---|---|", flush=True)
     with tempfile.TemporaryDirectory() as temporary:
         folder = options.keep or Path(temporary)
@@ -72,7 +80,9 @@ def scenarios(options: argparse.Namespace, folder: Path) -> Iterator[Scenario]:
     values = dict(setting.split("=", 1) for setting in options.settings)
     for name in options.scenarios.split(","):
         plain = with_options(load_scenario(SCENARIOS / f"{name}.yaml"), **typed(values))
-        pairs = {"paper": PAIRS, "own": (plain.reduction.pair,)}.get(options.pairs, options.pairs.split(","))
+        pairs = {"paper": PAIRS, "own": (plain.reduction.pair,)}.get(
+            options.pairs, options.pairs.split(",")
+        )
         for pair in pairs:
             scenario = with_options(plain, pair=pair)
             yield scenario
@@ -84,7 +94,9 @@ def scenarios(options: argparse.Namespace, folder: Path) -> Iterator[Scenario]:
 
 
 def typed(values: dict[str, str]) -> dict[str, float | str]:
-    return {name: value if SETTINGS[name].choices else float(value) for name, value in values.items()}
+    return {
+        name: value if SETTINGS[name].choices else float(value) for name, value in values.items()
+    }
 
 
 def reduced(scenario: Scenario, path: Path, jobs: int, search_only: bool) -> Reduced:
@@ -108,7 +120,9 @@ def children() -> float:
 
 def sliced(state: RunState) -> frozenset[str]:
     """The first slice; the whole world if there is none."""
-    return frozenset(next((node.environment for node in state.nodes if node.sliced_by), state.elements))
+    return frozenset(
+        next((node.environment for node in state.nodes if node.sliced_by), state.elements)
+    )
 
 
 def row(scenario: Scenario, done: Reduced) -> str:

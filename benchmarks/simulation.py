@@ -47,7 +47,9 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--scenarios", default="ditch,friction,rubble")
     parser.add_argument("--world", type=Path)
-    parser.add_argument("--spawn", default="0,0,0.2,0", help="x, y, z m and yaw rad; with a world file")
+    parser.add_argument(
+        "--spawn", default="0,0,0.2,0", help="x, y, z m and yaw rad; with a world file"
+    )
     parser.add_argument("--goal", default="5,0", help="x, y m; with a world file")
     arguments = parser.parse_args()
     print("| scenario | models | simulated s a second | bare AdvanceTo | ratio |")
@@ -57,7 +59,10 @@ def main() -> None:
         variants = Variants(world, robot, scenario)
         elements = world.elements()
         for kept in (elements, elements[::2]):
-            print(row(variants._template(frozenset(kept)), name, frozenset(kept), arguments.seeds), flush=True)
+            print(
+                row(variants._template(frozenset(kept)), name, frozenset(kept), arguments.seeds),
+                flush=True,
+            )
 
 
 def scenarios(arguments: argparse.Namespace) -> Iterator[tuple[str, Scenario]]:
@@ -67,7 +72,10 @@ def scenarios(arguments: argparse.Namespace) -> Iterator[tuple[str, Scenario]]:
         return
     x, y, z, yaw = map(float, arguments.spawn.split(","))
     goal_x, goal_y = map(float, arguments.goal.split(","))
-    yield arguments.world.stem, scenario_for_world(arguments.world, (x, y, z, yaw), (goal_x, goal_y))
+    yield (
+        arguments.world.stem,
+        scenario_for_world(arguments.world, (x, y, z, yaw), (goal_x, goal_y)),
+    )
 
 
 def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:
@@ -84,7 +92,9 @@ def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:
     return f"| {name} | {len(keep)} | {speed:.0f} | {bare_speed:.0f} | {speed / bare_speed:.2f} |"
 
 
-def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], simulated: float) -> float:
+def bare(
+    template: Template, keep: frozenset[str], speeds: list[np.ndarray], simulated: float
+) -> float:
     """CPU time (s) of simulating a run with these wheel speeds."""
     shared, period = template.context, template._clock.command_period
     built, present = shared.built, keep | template._always
@@ -98,7 +108,9 @@ def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], sim
 
         def advance() -> None:
             for number, wheels in enumerate(speeds, start=1):
-                motors.FixValue(shared.plant_context, np.concatenate([np.zeros_like(wheels), wheels]))
+                motors.FixValue(
+                    shared.plant_context, np.concatenate([np.zeros_like(wheels), wheels])
+                )
                 simulator.AdvanceTo(min(number * period, simulated))
 
         return cpu(advance)[0]

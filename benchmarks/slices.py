@@ -63,16 +63,34 @@ class Count:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("world", nargs="?", help="a scenario's name or a world file")
-    parser.add_argument("--spawn", default="0,0,0.2,0", help="x, y, z m and yaw rad; with a world file")
+    parser.add_argument(
+        "--spawn", default="0,0,0.2,0", help="x, y, z m and yaw rad; with a world file"
+    )
     parser.add_argument("--goal", default="5,0", help="x, y m; with a world file")
-    parser.add_argument("--stand-in", action="append", default=[], help="as in `ddenv run`; with a world file")
-    parser.add_argument("--inside", action="store_true", help="as in `ddenv run`; with a world file")
-    parser.add_argument("--seconds", type=float, help="simulated time of a run; the scenario's by default")
-    parser.add_argument("--tests", type=int, default=36, help="implied tests of each world, at most")
+    parser.add_argument(
+        "--stand-in", action="append", default=[], help="as in `ddenv run`; with a world file"
+    )
+    parser.add_argument(
+        "--inside", action="store_true", help="as in `ddenv run`; with a world file"
+    )
+    parser.add_argument(
+        "--seconds", type=float, help="simulated time of a run; the scenario's by default"
+    )
+    parser.add_argument(
+        "--tests", type=int, default=36, help="implied tests of each world, at most"
+    )
     parser.add_argument("--worlds", type=int, default=10, help="small worlds of each kind")
-    parser.add_argument("--from", type=int, default=0, dest="first", help="number of the first small world, and seed")
+    parser.add_argument(
+        "--from",
+        type=int,
+        default=0,
+        dest="first",
+        help="number of the first small world, and seed",
+    )
     parser.add_argument("--forget", choices=FORGOTTEN, help="a kind of participant to leave out")
     options = parser.parse_args()
     if options.forget:
@@ -84,7 +102,12 @@ def main() -> int:
     husky = read_model(SDF / "robots" / "husky.sdf")
     numbers = range(options.first, options.first + options.worlds)
     differ = [
-        row(kind, ((small_world(kind, one), husky, small_scenario(one)) for one in numbers), options.tests, 0)
+        row(
+            kind,
+            ((small_world(kind, one), husky, small_scenario(one)) for one in numbers),
+            options.tests,
+            0,
+        )
         for kind in KINDS
     ]
     return int(sum(differ) > 0)
@@ -98,7 +121,9 @@ def named(options: argparse.Namespace) -> tuple[World, Model, Scenario]:
         x, y, z, yaw = map(float, options.spawn.split(","))
         goal_x, goal_y = map(float, options.goal.split(","))
         scenario = scenario_for_world(Path(options.world), (x, y, z, yaw), (goal_x, goal_y))
-        scenario = with_options(scenario, reading=reading_of(stand_in=options.stand_in, inside=options.inside))
+        scenario = with_options(
+            scenario, reading=reading_of(stand_in=options.stand_in, inside=options.inside)
+        )
     scenario = with_options(scenario, timeout=options.seconds)
     return *load_parts(scenario), scenario
 
@@ -116,12 +141,16 @@ def row(kind: str, worlds: Iterable[tuple[World, Model, Scenario]], tests: int, 
     return found.differ
 
 
-def audit(simulator: Variants, everything: frozenset[str], tests: int, first: int, found: Count) -> None:
+def audit(
+    simulator: Variants, everything: frozenset[str], tests: int, first: int, found: Count
+) -> None:
     """Simulates implied tests in one world, and counts them in `found`."""
     chance = random.Random(first)
     elements = sorted(everything)
     number = {name: place for place, name in enumerate(elements)}
-    ties = Ties.among((number[name], number[other]) for name, other in simulator.ties(everything) or ())
+    ties = Ties.among(
+        (number[name], number[other]) for name, other in simulator.ties(everything) or ()
+    )
     found.worlds += 1
     for seed in range(first, first + tests // PARTS):
         there = everything if seed % 2 == 0 else part(everything, chance)

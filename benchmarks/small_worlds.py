@@ -19,7 +19,11 @@ Thing = Callable[[int, float, float], str]
 
 def small_scenario(number: int) -> Scenario:
     """The robot sees by lidar in every second world."""
-    sees = {"sensors": {"lidar": {"range": 6.0}}, "controller": {"use": "costmap"}} if number % 2 else {}
+    sees = (
+        {"sensors": {"lidar": {"range": 6.0}}, "controller": {"use": "costmap"}}
+        if number % 2
+        else {}
+    )
     data = {
         "name": f"small {number}",
         "world": "small.sdf",
@@ -49,24 +53,38 @@ def wall(number: int, x: float, y: float) -> str:
 
 
 def door(number: int, x: float, y: float) -> str:
-    return model(f"door_{number}", x, y, 0.6, box(0.05, 1.0, 0.8), 3.0, hinge("world", "link", (0, 0.5, 0), "0 0 1"))
+    return model(
+        f"door_{number}",
+        x,
+        y,
+        0.6,
+        box(0.05, 1.0, 0.8),
+        3.0,
+        hinge("world", "link", (0, 0.5, 0), "0 0 1"),
+    )
 
 
 def pile(number: int, x: float, y: float) -> str:
     """One cube lies askew on another, or falls onto it."""
     low, high = f"pile_{number}_low", f"pile_{number}_high"
-    return model(low, x, y, 0.15, CUBE, 1.0) + model(high, x + 0.1, y, 0.46 + 0.1 * (number % 2), CUBE, 1.0)
+    return model(low, x, y, 0.15, CUBE, 1.0) + model(
+        high, x + 0.1, y, 0.46 + 0.1 * (number % 2), CUBE, 1.0
+    )
 
 
 def boards(number: int, x: float, y: float) -> str:
     """Two boards with a third across them."""
     along, across = box(0.9, 0.09, 0.04), box(0.09, 0.9, 0.04)
-    low = "".join(model(f"board_{number}_{side}", x, y + 0.2 * side, 0.02, along, 2.0) for side in (-1, 1))
+    low = "".join(
+        model(f"board_{number}_{side}", x, y + 0.2 * side, 0.02, along, 2.0) for side in (-1, 1)
+    )
     return low + model(f"board_{number}_across", x, y, 0.07, across, 2.0)
 
 
 def shelf(number: int, x: float, y: float) -> str:
-    return model(f"shelf_{number}", x, y, 0.2, box(0.4, 0.4, 0.4)) + model(f"on_shelf_{number}", x, y, 0.55, CUBE, 1.0)
+    return model(f"shelf_{number}", x, y, 0.2, box(0.4, 0.4, 0.4)) + model(
+        f"on_shelf_{number}", x, y, 0.55, CUBE, 1.0
+    )
 
 
 def ball(number: int, x: float, y: float) -> str:
@@ -76,7 +94,9 @@ def ball(number: int, x: float, y: float) -> str:
 def chain(number: int, x: float, y: float) -> str:
     """Two cubes on one hinge, which may collide with each other."""
     own = "<self_collide>true</self_collide>" + hinge("link", "other", (0, 0, 0.3), "1 0 0")
-    return model(f"chain_{number}", x, y, 0.2, CUBE, 1.0, link("other", CUBE, 1.0, "0.05 0 0.4 0 0 0") + own)
+    return model(
+        f"chain_{number}", x, y, 0.2, CUBE, 1.0, link("other", CUBE, 1.0, "0.05 0 0.4 0 0 0") + own
+    )
 
 
 def loose_pair(number: int, x: float, y: float) -> str:
@@ -103,12 +123,16 @@ CUBE = box(0.3, 0.3, 0.3)
 
 def link(name: str, shape: str, mass: float, pose: str = "0 0 0 0 0 0") -> str:
     moments = "".join(f"<{axis}>{0.03 * mass}</{axis}>" for axis in ("ixx", "iyy", "izz"))
-    inertial = f"<inertial><mass>{mass}</mass><inertia>{moments}</inertia></inertial>" if mass else ""
+    inertial = (
+        f"<inertial><mass>{mass}</mass><inertia>{moments}</inertia></inertial>" if mass else ""
+    )
     collision = f'<collision name="c"><geometry>{shape}</geometry></collision>'
     return f'<link name="{name}"><pose>{pose}</pose>{inertial}{collision}</link>'
 
 
-def model(name: str, x: float, y: float, z: float, shape: str, mass: float = 0.0, more: str = "") -> str:
+def model(
+    name: str, x: float, y: float, z: float, shape: str, mass: float = 0.0, more: str = ""
+) -> str:
     """A model of one shape, static without a mass (kg)."""
     static = "" if mass else "<static>true</static>"
     return f'<model name="{name}">{static}<pose>{x} {y} {z} 0 0 0</pose>{link("link", shape, mass)}{more}</model>'

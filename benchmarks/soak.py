@@ -32,7 +32,9 @@ STEPS = 8
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--tests", type=int, default=65_000)
     parser.add_argument("--engine", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -52,10 +54,14 @@ def main() -> None:
 def soak(run: Path, tests: int) -> None:
     """Prints memory, MB, as the run of so many tests grows."""
     words = [sys.executable, __file__, "--engine", str(run)]
-    scene = subprocess.Popen([sys.executable, "-m", "ddenv.scene", str(run)], stdout=subprocess.DEVNULL)
+    scene = subprocess.Popen(
+        [sys.executable, "-m", "ddenv.scene", str(run)], stdout=subprocess.DEVNULL
+    )
     engine = subprocess.Popen(words, stdout=subprocess.DEVNULL)
     viewer = Terminal([sys.executable, "-m", "ddenv", "open", str(run)], dict(os.environ))
-    print("| tests | after, s | run file, MB | engine, MB | workbench, MB | scene, MB |\n|---|---|---|---|---|---|")
+    print(
+        "| tests | after, s | run file, MB | engine, MB | workbench, MB | scene, MB |\n|---|---|---|---|---|---|"
+    )
     began, shown, ended, last = time.monotonic(), 0, 0, 0
     try:
         with RunFile(run) as file:
@@ -66,10 +72,17 @@ def soak(run: Path, tests: int) -> None:
                 if ended * STEPS >= (shown + 1) * tests:
                     shown = ended * STEPS // tests
                     sizes = [
-                        memory_of(Path(f"/proc/{process}")) / 1e6 for process in (engine.pid, viewer.id, scene.pid)
+                        memory_of(Path(f"/proc/{process}")) / 1e6
+                        for process in (engine.pid, viewer.id, scene.pid)
                     ]
-                    row = f"{ended:,}", f"{time.monotonic() - began:.0f}", f"{run.stat().st_size / 1e6:.0f}"
-                    print(f"| {' | '.join([*row, *(f'{size:.0f}' for size in sizes)])} |", flush=True)
+                    row = (
+                        f"{ended:,}",
+                        f"{time.monotonic() - began:.0f}",
+                        f"{run.stat().st_size / 1e6:.0f}",
+                    )
+                    print(
+                        f"| {' | '.join([*row, *(f'{size:.0f}' for size in sizes)])} |", flush=True
+                    )
     finally:
         viewer.leave()
         for process in (engine, scene):

@@ -61,7 +61,8 @@ def make_world(n: int, k: int, seed: int) -> World:
     trajectory = _drive(np.array([0.0, rng.uniform(0, WIDTH), 0.0]), failure, rng)
     apart = np.linalg.norm(places[:, None, :2] - trajectory[None, ::5, 1:3], axis=2) < VIEW
     sensed = {
-        elements[index]: float(trajectory[::5, 0][apart[index].argmax()]) for index in np.flatnonzero(apart.any(1))
+        elements[index]: float(trajectory[::5, 0][apart[index].argmax()])
+        for index in np.flatnonzero(apart.any(1))
     }
     evidence = {
         "positions": dict(zip(elements, map(tuple, places.tolist()), strict=True)),
@@ -97,7 +98,9 @@ def tests_of(world: World, options: dict | None, flaky: bool, seed: int) -> tupl
     return found.search_tests, set(found.kept) == world.needed
 
 
-def _picire(world: World, test: Callable[[frozenset[str]], bool], iterations: int) -> tuple[int, bool]:
+def _picire(
+    world: World, test: Callable[[frozenset[str]], bool], iterations: int
+) -> tuple[int, bool]:
     """picire asks again whether its configuration still fails before each step; what is known is not counted twice."""
     import picire
 
@@ -123,14 +126,18 @@ def mean_of(task: tuple[tuple[int, int], dict | None, bool, int]) -> tuple[float
     """Mean number of tests over some worlds, and in how many % exactly the needed models were left."""
     size, options, flaky, worlds = task
     results = [tests_of(make_world(*size, seed), options, flaky, seed) for seed in range(worlds)]
-    return float(np.mean([tests for tests, _ in results])), 100 * float(np.mean([right for _, right in results]))
+    return float(np.mean([tests for tests, _ in results])), 100 * float(
+        np.mean([right for _, right in results])
+    )
 
 
 def bound(n: int, k: int) -> float:
     return max(k + 1, math.log2(math.comb(n, k)))
 
 
-def table(what: str, rows: dict[str, dict | None], worlds: int, large_worlds: int, jobs: int) -> None:
+def table(
+    what: str, rows: dict[str, dict | None], worlds: int, large_worlds: int, jobs: int
+) -> None:
     """One row each, over `worlds` worlds, of 5,000 models `large_worlds`.
 
     Deterministic / flaky, and for the flaky oracle how often the result was right.
@@ -149,7 +156,8 @@ def table(what: str, rows: dict[str, dict | None], worlds: int, large_worlds: in
             # The long ones first, so that no worker waits for the last of them.
             results = pool.map(mean_of, tasks[::-1], chunksize=1)[::-1]
             cells = [
-                f"{plain[0]:.1f} / {flaky[0]:.0f}" for plain, flaky in zip(results[::2], results[1::2], strict=True)
+                f"{plain[0]:.1f} / {flaky[0]:.0f}"
+                for plain, flaky in zip(results[::2], results[1::2], strict=True)
             ]
             right = np.mean([share for _, share in results[1::2]])
             print(
@@ -168,7 +176,10 @@ def main() -> None:
     if options.only in (None, "algorithms"):
         table("tests, n and k", ALGORITHMS, options.worlds, options.large_worlds, options.jobs)
     if options.only in (None, "pairs"):
-        asked = {pair: dict(zip(("partitioning", "prioritization"), split_pair(pair), strict=True)) for pair in pairs()}
+        asked = {
+            pair: dict(zip(("partitioning", "prioritization"), split_pair(pair), strict=True))
+            for pair in pairs()
+        }
         table("tests of ddenv, n and k", asked, options.worlds, options.large_worlds, options.jobs)
 
 

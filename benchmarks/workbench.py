@@ -27,7 +27,11 @@ from programs import Terminal, memory_of
 HERE = Path(__file__).parent
 DDENV = [sys.executable, "-c", "from ddenv.cli import main; main()"]
 BARE = [sys.executable, str(HERE / "workbench.py"), "--bare"]
-KEYS = {"down in the table": ("\x1b[B", "\x1b[A"), "+ on the map": ("+", "-"), "tab": ("\t", "\x1b[Z")}
+KEYS = {
+    "down in the table": ("\x1b[B", "\x1b[A"),
+    "+ on the map": ("+", "-"),
+    "tab": ("\t", "\x1b[Z"),
+}
 # So many letters and digits on the screen: it has begun.
 WORDS = 150
 QUIET = 0.05  # s
@@ -36,8 +40,12 @@ LONG = ["--jobs", "2", "--accept-rate", "first", "--iterations", "1000", "--no-s
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer starts and keys, and a run of 200 tests")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="fewer starts and keys, and a run of 200 tests"
+    )
     parser.add_argument("--bare", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.bare:
@@ -52,7 +60,9 @@ def main() -> None:
             "PYTHONPYCACHEPREFIX": f"{name}/pyc",
         }
         ditch, large = folder / "ditch.ddenv", folder / "large.ddenv"
-        bytes_a_second = watched(folder / "running.ddenv", environment, 3.0 if options.quick else 20.0)
+        bytes_a_second = watched(
+            folder / "running.ddenv", environment, 3.0 if options.quick else 20.0
+        )
         subprocess.run(
             [*DDENV, "run", "ditch", "--budget", "40", "--output", ditch],
             env=environment,
@@ -60,7 +70,16 @@ def main() -> None:
             check=False,  # its exit code says that the budget was used up
         )
         subprocess.run(
-            [sys.executable, HERE / "long_run.py", large, "--tests", str(tests), "--models", str(models)], check=True
+            [
+                sys.executable,
+                HERE / "long_run.py",
+                large,
+                "--tests",
+                str(tests),
+                "--models",
+                str(models),
+            ],
+            check=True,
         )
         print("| figure | idle | two busy processes | aim |\n|---|---|---|---|")
         idle = figures(ditch, large, environment, starts, presses)
@@ -77,13 +96,19 @@ def figures(
     """Each figure with its aim."""
     found = {
         "`ddenv`: first paint": (first_paint([], environment, starts), "1.8 x"),
-        "`ddenv open RUN`: first paint": (first_paint(["open", str(ditch)], environment, starts), "1.8 x"),
+        "`ddenv open RUN`: first paint": (
+            first_paint(["open", str(ditch)], environment, starts),
+            "1.8 x",
+        ),
     }
     for run, words, aim in ((ditch, "", "p95 30 ms"), (large, ", large run", "p95 50 ms")):
         with started([*DDENV, "open", str(run)], environment) as terminal:
             for name, keys in KEYS.items():
                 found[f"{name}{words}"] = (answers(terminal, keys, presses), aim)
-            found[f"memory{words}"] = (f"{memory_of(Path(f'/proc/{terminal.id}')) / 1e6:.0f} MB", "")
+            found[f"memory{words}"] = (
+                f"{memory_of(Path(f'/proc/{terminal.id}')) / 1e6:.0f} MB",
+                "",
+            )
     with started(BARE, environment) as terminal:
         found["down in a bare table"] = (answers(terminal, KEYS["down in the table"], presses), "")
     return found
@@ -146,7 +171,9 @@ def answers(terminal: Terminal, keys: tuple[str, str], times: int) -> str:
 def watched(run: Path, environment: dict[str, str], seconds: float) -> float:
     """Bytes a second that the workbench writes while a reduction runs and no key is pressed."""
     words = [*DDENV, "run", "ditch", *LONG, "--output", str(run)]
-    with subprocess.Popen(words, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as engine:
+    with subprocess.Popen(
+        words, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as engine:
         try:
             while not run.exists():
                 time.sleep(0.1)
@@ -162,7 +189,9 @@ def watched(run: Path, environment: dict[str, str], seconds: float) -> float:
 @contextmanager
 def busy() -> Iterator[None]:
     """Two processes that compute as politely as the engine's workers do."""
-    processes = [subprocess.Popen(["nice", sys.executable, "-c", "while True: pass"]) for _ in range(2)]
+    processes = [
+        subprocess.Popen(["nice", sys.executable, "-c", "while True: pass"]) for _ in range(2)
+    ]
     try:
         yield
     finally:

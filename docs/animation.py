@@ -22,7 +22,11 @@ from ddenv.text import count
 
 SECONDS, LAST = 1.6, 4.0  # of a picture, and of the last one
 WIDTH, HIGHEST, TOP = 860.0, 460.0, 14.0  # pixels
-OUTCOMES = {"similar": "the same failure", "other": "another failure", "pass": "the goal is reached"}
+OUTCOMES = {
+    "similar": "the same failure",
+    "other": "another failure",
+    "pass": "the goal is reached",
+}
 STYLE = """
 svg { font: 15px Inter, "Segoe UI", Helvetica, Arial, "DejaVu Sans", sans-serif; }
 .model { stroke: #24292f; stroke-width: 0.8; fill: #d29922; }
@@ -53,14 +57,19 @@ class Picture:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("run", type=Path)
     parser.add_argument("svg", type=Path)
     options = parser.parse_args()
     record = read_run(options.run)
     shown = list(pictures(record))
     with RunFile(options.run) as file:
-        paths = [np.frombuffer(file.trajectory(one.test.id)).reshape(-1, COLUMNS)[::4, 1:3] for one in shown]
+        paths = [
+            np.frombuffer(file.trajectory(one.test.id)).reshape(-1, COLUMNS)[::4, 1:3]
+            for one in shown
+        ]
     options.svg.write_text(drawing(record, shown, paths))
 
 
@@ -74,12 +83,18 @@ def pictures(record: Record) -> Iterator[Picture]:
             if candidate.tests and candidate.verdict:
                 test = state.tests[candidate.tests[-1] - 1]
                 tried = frozenset(state.environments[test.environment].names(state.elements))
-                yield Picture(here, tried, test, f"Round {made.number}: {said(candidate, len(tried))}")
+                yield Picture(
+                    here, tried, test, f"Round {made.number}: {said(candidate, len(tried))}"
+                )
                 here = tried if candidate.verdict == "similar" else here
-    for test in {test.environment: test for test in state.tests if test.phase == "certificate"}.values():
+    for test in {
+        test.environment: test for test in state.tests if test.phase == "certificate"
+    }.values():
         tried = frozenset(state.environments[test.environment].names(state.elements))
         if tried < here and len(tried) == len(here) - 1:
-            yield Picture(here, tried, test, f"Certificate: fresh runs without {', '.join(here - tried)}")
+            yield Picture(
+                here, tried, test, f"Certificate: fresh runs without {', '.join(here - tried)}"
+            )
     words = f"What is left: {len(here)} of {len(record.elements)} models: {', '.join(sorted(here))}"
     yield Picture(here, here, first, words)
 
@@ -105,12 +120,19 @@ def drawing(record: Record, shown: list[Picture], paths: list[np.ndarray]) -> st
         name, kind = each.model.name, "floor" if each.floor else ""
         seen = [1.0] * len(shown)
         if name in record.elements:
-            seen = [1.0 if name in one.tried else 0.25 if name in one.there else 0.04 for one in shown]
+            seen = [
+                1.0 if name in one.tried else 0.25 if name in one.there else 0.04 for one in shown
+            ]
         else:
             kind = "ground"
         path = f'<path class="model {kind}" d="{path_of(each, frame)}"'
-        lines.append(f"{path}>{animated(seen, times)}</path>" if len(set(seen)) > 1 else f"{path}/>")
-    lines += [at(frame.pixel(ends[0]), badge("start", "S")), at(frame.pixel(ends[1]), badge("goal", "G"))]
+        lines.append(
+            f"{path}>{animated(seen, times)}</path>" if len(set(seen)) > 1 else f"{path}/>"
+        )
+    lines += [
+        at(frame.pixel(ends[0]), badge("start", "S")),
+        at(frame.pixel(ends[1]), badge("goal", "G")),
+    ]
     for number, (one, way) in enumerate(zip(shown, paths, strict=True)):
         points = frame.pixels(way)
         line = "M" + "L".join(f"{x:.0f} {y:.0f}" for x, y in points)
@@ -127,7 +149,9 @@ def drawing(record: Record, shown: list[Picture], paths: list[np.ndarray]) -> st
 
 def animated(values: list[float], times: list[float]) -> str:
     """An opacity that changes at `times`, s, again and again; the last one is when all of it ends."""
-    changes = [number for number, value in enumerate(values) if not number or value != values[number - 1]]
+    changes = [
+        number for number, value in enumerate(values) if not number or value != values[number - 1]
+    ]
     keys = ";".join(f"{times[number] / times[-1]:.4f}" for number in changes)
     opacity = ";".join(f"{values[number]:g}" for number in changes)
     steps = f'calcMode="discrete" dur="{times[-1]:.1f}s" repeatCount="indefinite"'

@@ -34,9 +34,7 @@ CAMERAS = {
     "friction": ((2.0, -0.4, 0.2), 6.5, -60.0, 34.0),
 }
 LEGEND = ("path of this test", "ghost: the other run", "left out of this test")
-READY = (
-    "typeof play !== 'undefined' && play && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 8"
-)
+READY = "typeof play !== 'undefined' && play && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 8"
 # Hides Meshcat's own controls, and the entries of the legend that are not in the picture.
 TIDY = """
     run(false);
@@ -71,21 +69,40 @@ async def picture(run: RunFile) -> None:
         shot = await photograph(await Page.open(port), url)
     await server.close()
     file = DOCS / f"{name}.png"
-    Image.open(io.BytesIO(shot)).convert("RGB").quantize(COLORS, dither=Image.Dither.NONE).save(file, optimize=True)
+    Image.open(io.BytesIO(shot)).convert("RGB").quantize(COLORS, dither=Image.Dither.NONE).save(
+        file, optimize=True
+    )
     print(f"wrote {file}, {file.stat().st_size / 1000:.0f} kB")
 
 
-def view(center: tuple[float, float, float], distance: float, azimuth: float, elevation: float) -> View:
+def view(
+    center: tuple[float, float, float], distance: float, azimuth: float, elevation: float
+) -> View:
     def around(far: float, azimuth: float, elevation: float) -> tuple[float, float, float]:
         turn, rise = math.radians(azimuth), math.radians(elevation)
-        return far * math.cos(rise) * math.cos(turn), far * math.cos(rise) * math.sin(turn), far * math.sin(rise)
+        return (
+            far * math.cos(rise) * math.cos(turn),
+            far * math.cos(rise) * math.sin(turn),
+            far * math.sin(rise),
+        )
 
-    return View(center, around(distance, azimuth, elevation), around(2 * distance, azimuth - 60, 50), distance)
+    return View(
+        center,
+        around(distance, azimuth, elevation),
+        around(2 * distance, azimuth - 60, 50),
+        distance,
+    )
 
 
 async def photograph(page: Page, url: str) -> bytes:
     width, height = SIZE
-    await page.do("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+    await page.do(
+        "Emulation.setDeviceMetricsOverride",
+        width=width,
+        height=height,
+        deviceScaleFactor=1,
+        mobile=False,
+    )
     await page.do("Page.navigate", url=url)
     while not await page.value(READY):
         await asyncio.sleep(0.2)

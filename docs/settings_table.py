@@ -40,14 +40,20 @@ def _allowed(one: Setting) -> str:
     if one.kind is bool:
         return "`true`, `false`"
     if one.kind is str:
-        return ", ".join(f"`{choice}`" for choice in one.choices) or one.more.rstrip(".").replace("'", "`")
+        return ", ".join(f"`{choice}`" for choice in one.choices) or one.more.rstrip(".").replace(
+            "'", "`"
+        )
     return one.range
 
 
 def _default(one: Setting) -> str:
     if one.default is None:
         return one.none
-    return f"`{str(one.default).lower()}`" if isinstance(one.default, str | bool) else f"{one.default:g}"
+    return (
+        f"`{str(one.default).lower()}`"
+        if isinstance(one.default, str | bool)
+        else f"{one.default:g}"
+    )
 
 
 if __name__ == "__main__":

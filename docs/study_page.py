@@ -59,13 +59,17 @@ def marked(page: str, name: str) -> str:
 
 def headline(nine: str) -> str:
     """One row for each scenario of the table `nine`: how many methods are certified, and each column's range over these."""
-    head, sides, *rows = ([cell.strip() for cell in line.strip("| \n").split("|")] for line in nine.splitlines())
+    head, sides, *rows = (
+        [cell.strip() for cell in line.strip("| \n").split("|")] for line in nine.splitlines()
+    )
     begin = 3 if CERTIFIED in head else 2
     lines = [[head[0], *head[2:]], [sides[0], *sides[2:]]]
     for scenario in dict.fromkeys(row[0] for row in rows):
         every = [row for row in rows if row[0] == scenario]
         certified = [row for row in every if begin == 2 or _is_certified(row[2])]
-        ranges = [_range(column) for column in zip(*(row[begin:] for row in certified), strict=True)]
+        ranges = [
+            _range(column) for column in zip(*(row[begin:] for row in certified), strict=True)
+        ]
         number = [f"{len(certified)} of {len(every)}"][: begin - 2]
         lines.append([scenario, *number, *(ranges or ["–"] * len(head[begin:]))])
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)

@@ -23,7 +23,9 @@ def main() -> None:
 
 def filled(page: str) -> str:
     """The page with all tables up to date."""
-    return TABLE.sub(lambda found: f"{found[1]}{_TABLES[found[2]](found[3].split())}{found[4]}", page)
+    return TABLE.sub(
+        lambda found: f"{found[1]}{_TABLES[found[2]](found[3].split())}{found[4]}", page
+    )
 
 
 def sections(page: str) -> list[str]:

@@ -50,7 +50,11 @@ HOME = Path(tempfile.gettempdir()) / "you"
 # Models that are on no machine, by place.
 MISSING = "".join(
     f"<include><uri>model://{name}</uri><pose>{place} 0 0 0 0</pose></include>"
-    for name, place in {"jersey_barrier": "3 -4", "old_shelf": "5 4", "construction_cone": "6 -3"}.items()
+    for name, place in {
+        "jersey_barrier": "3 -4",
+        "old_shelf": "5 4",
+        "construction_cone": "6 -3",
+    }.items()
 )
 FLOOR = ("asphalt_near", "asphalt_far")
 
@@ -64,7 +68,9 @@ class Picture:
 
 
 PICTURES = {
-    "setup": Picture("SetupScreen", "The setup screen: what to choose from, the world, the settings"),
+    "setup": Picture(
+        "SetupScreen", "The setup screen: what to choose from, the world, the settings"
+    ),
     "setup-small": Picture("SetupScreen", "The setup screen at 80x24: its settings"),
     "setup-start": Picture("SetupScreen", "Picking the robot's start on the map of a world"),
     "setup-missing": Picture("SetupScreen", "Missing files, each with its remedy"),
@@ -129,14 +135,19 @@ def main() -> None:
     (HOME / "worlds").mkdir()
     depot = (SDF / "worlds/friction.sdf").read_text(encoding="utf-8")
     (HOME / "worlds/depot.sdf").write_text(depot, encoding="utf-8")
-    (HOME / "worlds/yard.sdf").write_text(depot.replace("</world>", f"{MISSING}</world>"), encoding="utf-8")
+    (HOME / "worlds/yard.sdf").write_text(
+        depot.replace("</world>", f"{MISSING}</world>"), encoding="utf-8"
+    )
     os.chdir(HOME / "worlds")
     os.environ.update(HOME=str(HOME), DDENV_HOME=str(HOME), LOGNAME="you", TZ="UTC")
     for name in ("NO_COLOR", "DDENV_CONFIG"):
         os.environ.pop(name, None)
     time.tzset()
     try:
-        with patch("socket.gethostname", lambda: "robot"), patch("ddenv.runs.processor.usable_cores", lambda: 2):
+        with (
+            patch("socket.gethostname", lambda: "robot"),
+            patch("ddenv.runs.processor.usable_cores", lambda: 2),
+        ):
             asyncio.run(make_all())
     finally:
         for run in (HOME / "runs").glob("*.ddenv"):
@@ -173,7 +184,11 @@ async def teach() -> None:
             screen = pilot.app.screen
             assert isinstance(screen, LessonScreen)
             while screen.course.step < 6 or screen.course.page.chosen is None:
-                await press(pilot, "c" if screen.course.step == 6 else "s", *["enter"] * (screen.course.step < 6))
+                await press(
+                    pilot,
+                    "c" if screen.course.step == 6 else "s",
+                    *["enter"] * (screen.course.step < 6),
+                )
             await take(pilot, name)
             if name == "lesson":
                 await press(pilot, "escape")
@@ -269,11 +284,20 @@ async def from_elsewhere(pilot: Pilot[int], run: Path, engine: Popen[bytes]) -> 
     """The same round on other screens. All are opened first: the rounds of this run are soon over."""
     async with AsyncExitStack() as stack:
 
-        async def other(size: tuple[int, int], theme: str = "", *, watch: bool = False) -> Pilot[int]:
+        async def other(
+            size: tuple[int, int], theme: str = "", *, watch: bool = False
+        ) -> Pilot[int]:
             return await stack.enter_async_context(opened(run, size, theme, watch=watch))
 
-        views = {"run-map": await other(SMALL), "run-table": await other(SMALL), "run-large": await other(LARGE)}
-        views |= {"run-light": await other(MIDDLE, "ddenv-light"), "run-ansi": await other(MIDDLE, "ansi-dark")}
+        views = {
+            "run-map": await other(SMALL),
+            "run-table": await other(SMALL),
+            "run-large": await other(LARGE),
+        }
+        views |= {
+            "run-light": await other(MIDDLE, "ddenv-light"),
+            "run-ansi": await other(MIDDLE, "ansi-dark"),
+        }
         views["watch"] = await other(MIDDLE, watch=True)
         await press(views["run-map"], "1")
         await press(views["run-table"], "2")
@@ -285,7 +309,13 @@ async def from_elsewhere(pilot: Pilot[int], run: Path, engine: Popen[bytes]) -> 
 
 async def take_dialogs(pilot: Pilot[int]) -> None:
     """The dialogs that can be opened at any time."""
-    for name, key in (("help", "question_mark"), ("method", "e"), ("layers", "l"), ("copy", "y"), ("quit", "q")):
+    for name, key in (
+        ("help", "question_mark"),
+        ("method", "e"),
+        ("layers", "l"),
+        ("copy", "y"),
+        ("quit", "q"),
+    ):
         await press(pilot, key)
         await take(pilot, name)
         await press(pilot, "escape")
@@ -306,9 +336,17 @@ async def other_failures(pilot: Pilot[int]) -> None:
         before = state(pilot)
         # One test at a time: several end a round before anybody looks.
         await press(pilot, "a" if before.status == "waiting" else "s")
-        while (len(state(pilot).tests), len(state(pilot).nodes)) == (len(before.tests), len(before.nodes)):
+        while (len(state(pilot).tests), len(state(pilot).nodes)) == (
+            len(before.tests),
+            len(before.nodes),
+        ):
             await pilot.pause(0.05)
-        await until(pilot, lambda: state(pilot).status in ("paused", "waiting") and not run_screen(pilot).snapshot.live)
+        await until(
+            pilot,
+            lambda: (
+                state(pilot).status in ("paused", "waiting") and not run_screen(pilot).snapshot.live
+            ),
+        )
     await press(pilot, "2", "home", *["down"] * rows[0], "a")
     await take(pilot, "other")
     await press(pilot, "n", "f")
@@ -499,7 +537,9 @@ async def take(pilot: Pilot[int], name: str, *, settled_after: float = 0.6) -> N
     shown = type(pilot.app.screen).__name__
     if shown != PICTURES[name].screen:
         raise RuntimeError(f"{name}: {shown} is shown in place of {PICTURES[name].screen}")
-    (SCREENS / f"{name}.svg").write_text(pilot.app.export_screenshot(simplify=True), encoding="utf-8")
+    (SCREENS / f"{name}.svg").write_text(
+        pilot.app.export_screenshot(simplify=True), encoding="utf-8"
+    )
     print(f"wrote {name}", file=sys.stderr)
 
 
@@ -534,8 +574,14 @@ async def accept_if_waiting(pilot: Pilot[int]) -> None:
 
 def is_under_way(pilot: Pilot[int], tests: int = 0) -> bool:
     snapshot = run_screen(pilot).snapshot
-    judged = snapshot.state.round is None or any(one.verdict for one in snapshot.state.round.candidates)
-    return judged and snapshot.state.tests_done >= tests and any(row.time > UNDER_WAY for row in snapshot.live)
+    judged = snapshot.state.round is None or any(
+        one.verdict for one in snapshot.state.round.candidates
+    )
+    return (
+        judged
+        and snapshot.state.tests_done >= tests
+        and any(row.time > UNDER_WAY for row in snapshot.live)
+    )
 
 
 def others(now: RunState) -> list[int]:
@@ -557,7 +603,10 @@ def state(pilot: Pilot[int]) -> RunState:
 def new_run(name: str, **reduction: int) -> Path:
     run = free_run_path(name)
     scenario = load_scenario(find_scenario(name))
-    create_run(scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update=reduction)}), run)
+    create_run(
+        scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update=reduction)}),
+        run,
+    )
     return run
 
 

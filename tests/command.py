@@ -36,14 +36,20 @@ def python(code: str) -> Said:
 
 def loaded(code: str, *modules: str) -> list[str]:
     """Those of `modules` that a new Python has imported after this."""
-    done = python(f"import sys\n{code}\nprint(*(name for name in {modules} if name in sys.modules))")
+    done = python(
+        f"import sys\n{code}\nprint(*(name for name in {modules} if name in sys.modules))"
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()[-1].split()
 
 
 def _said(words: list[str], **options) -> Said:
-    done = subprocess.run(words, capture_output=True, timeout=PATIENCE, stdin=subprocess.DEVNULL, **options)
-    return Said(done.returncode, done.stdout.decode(errors="replace"), done.stderr.decode(errors="replace"))
+    done = subprocess.run(
+        words, capture_output=True, timeout=PATIENCE, stdin=subprocess.DEVNULL, **options
+    )
+    return Said(
+        done.returncode, done.stdout.decode(errors="replace"), done.stderr.decode(errors="replace")
+    )
 
 
 def in_process(monkeypatch, capsys, *words: object) -> Said:
@@ -61,6 +67,8 @@ def in_process(monkeypatch, capsys, *words: object) -> Said:
 
 def is_one_line(done, *words: str) -> None:
     """That a command was refused in one line with these words, and printed nothing else."""
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stdout + done.stderr
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), (
+        done.stdout + done.stderr
+    )
     assert "Traceback" not in done.stderr
     assert all(word in done.stderr for word in words), done.stderr

@@ -65,7 +65,9 @@ def run(tmp_path):
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What is slow for one of the named reasons is `slow`, but for its witness."""
     for item in items:
-        if any(item.get_closest_marker(name) for name in SLOW) and not item.get_closest_marker("witness"):
+        if any(item.get_closest_marker(name) for name in SLOW) and not item.get_closest_marker(
+            "witness"
+        ):
             item.add_marker("slow")
     # The longest come first, so that no process is left with them alone in the end.
     items.sort(key=lambda item: item.get_closest_marker("rates") is None)

@@ -28,7 +28,19 @@ NUMBERS = (
     *(1e300, -1e300, 1e18, -1e18, 1e9, 1e-300, -0.0, 0, -1, 2, 2**31, 2**63, 10**30, 10**400),
     *(math.nan, math.inf, -math.inf),
 )
-OTHERS = (None, True, "", "0", "1e300", "\x1b]0;x\x07\u202e[red]", "n" * 5000, [], [1e300], {}, {"a": 1})
+OTHERS = (
+    None,
+    True,
+    "",
+    "0",
+    "1e300",
+    "\x1b]0;x\x07\u202e[red]",
+    "n" * 5000,
+    [],
+    [1e300],
+    {},
+    {"a": 1},
+)
 
 
 def templates(folder: Path) -> list[Path]:
@@ -49,9 +61,20 @@ def hostile_run(scenes: list[Path], path: Path, seed: int) -> Path:
     shutil.copy(chance.choice(scenes), path)
     with sqlite3.connect(path) as database:
         for _ in range(chance.choice((1, 1, 1, 2, 5))):
-            chance.choice((_event, _event, _event, _order, _scenario, _scenario, _samples, _live, _world, _time))(
-                database, chance
-            )
+            chance.choice(
+                (
+                    _event,
+                    _event,
+                    _event,
+                    _order,
+                    _scenario,
+                    _scenario,
+                    _samples,
+                    _live,
+                    _world,
+                    _time,
+                )
+            )(database, chance)
     database.close()
     return path
 
@@ -61,7 +84,13 @@ def _value(chance: random.Random) -> object:
 
 
 def _leaves(value: object, way: tuple = ()) -> Iterator[tuple]:
-    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    items = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    )
     empty = True
     for key, inner in items:
         empty = False
@@ -104,7 +133,9 @@ def _order(database: sqlite3.Connection, chance: random.Random) -> None:
 
 def _scenario(database: sqlite3.Connection, chance: random.Random) -> None:
     """In the first event and in the document, or in one of them."""
-    data = json.loads(database.execute("SELECT data FROM event WHERE kind = 'created'").fetchone()[0])
+    data = json.loads(
+        database.execute("SELECT data FROM event WHERE kind = 'created'").fetchone()[0]
+    )
     _put(data["scenario"], chance)
     if chance.random() < 0.8:
         database.execute("UPDATE event SET data = ? WHERE kind = 'created'", (json.dumps(data),))
@@ -114,12 +145,19 @@ def _scenario(database: sqlite3.Connection, chance: random.Random) -> None:
 
 
 def _samples(database: sqlite3.Connection, chance: random.Random) -> None:
-    for test, model, samples in database.execute("SELECT test, model, samples FROM motion").fetchall():
+    for test, model, samples in database.execute(
+        "SELECT test, model, samples FROM motion"
+    ).fetchall():
         values = array("d", samples)
         for _ in range(chance.choice((1, 3, 50))):
             number = chance.choice((*NUMBERS[:-4], math.nan, math.inf))
-            values[chance.randrange(len(values))] = float(number) if abs(number) < 1e308 else math.inf
-        database.execute("UPDATE motion SET samples = ? WHERE test = ? AND model = ?", (values.tobytes(), test, model))
+            values[chance.randrange(len(values))] = (
+                float(number) if abs(number) < 1e308 else math.inf
+            )
+        database.execute(
+            "UPDATE motion SET samples = ? WHERE test = ? AND model = ?",
+            (values.tobytes(), test, model),
+        )
 
 
 def _live(database: sqlite3.Connection, chance: random.Random) -> None:
@@ -130,7 +168,9 @@ def _live(database: sqlite3.Connection, chance: random.Random) -> None:
 
 
 def _world(database: sqlite3.Connection, chance: random.Random) -> None:
-    text = database.execute("SELECT content FROM document WHERE name = 'world'").fetchone()[0].decode()
+    text = (
+        database.execute("SELECT content FROM document WHERE name = 'world'").fetchone()[0].decode()
+    )
     found = chance.choice(list(re.finditer(r"(?<=[ >])-?[0-9][0-9.e-]*(?=[ <])", text)))
     value = chance.choice(("1e300", "-1e300", "nan", "inf", "0", "-1", "1e18", "9e5", "1e-300"))
     text = text[: found.start()] + value + text[found.end() :]

@@ -17,7 +17,15 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Motions, Recorded, RunFile
 from ddenv.runfile.supports import stack_with
 
-OF_ROUND = ("candidate_judged", "waiting", "decided", "reduced", "round_finished", "vetoed", "unvetoed")
+OF_ROUND = (
+    "candidate_judged",
+    "waiting",
+    "decided",
+    "reduced",
+    "round_finished",
+    "vetoed",
+    "unvetoed",
+)
 OF_TESTS = ("test_started", "implied")
 Numbered = Callable[[Environment], int]
 

@@ -29,7 +29,11 @@ def model(name, shape, pose="1 1 0 0 0 0"):
     return f'<model name="{name}"><static>true</static><pose>{pose}</pose>{link}</model>'
 
 
-MODELS = model("a\x9b31mb\x90q\x9cc\u202e", BOX) + model("far\x85", BOX, "nan 1 0 0 0 0") + model("mesh\x9b", MESH)
+MODELS = (
+    model("a\x9b31mb\x90q\x9cc\u202e", BOX)
+    + model("far\x85", BOX, "nan 1 0 0 0 0")
+    + model("mesh\x9b", MESH)
+)
 WORLD = f'<?xml version="1.0"?><sdf version="1.9"><world name="w\x9bx">{MODELS}</world></sdf>'
 
 
@@ -39,7 +43,9 @@ def evil(tmp_path, home):
     run = fake_moments.mid_round(fake_run.FakeRun(tmp_path / "a.ddenv"))
     run.close()
     with sqlite3.connect(run.path) as database:
-        for id, text in database.execute("SELECT id, data FROM event WHERE kind = 'created'").fetchall():
+        for id, text in database.execute(
+            "SELECT id, data FROM event WHERE kind = 'created'"
+        ).fetchall():
             data = json.loads(text)
             data["scenario"]["name"] += ESCAPES
             data["elements"] = [name + ESCAPES for name in data["elements"]]
@@ -89,7 +95,11 @@ def test_nothing_that_is_printed_steers_the_terminal(evil, tmp_path, monkeypatch
     (tmp_path / "runs").mkdir()
     (tmp_path / "runs" / "b.ddenv").write_bytes(evil.read_bytes())
     there = {"RUN": str(evil), "WORLD": str(tmp_path / "w.sdf")}
-    said = in_process(monkeypatch, capsys, *(there.get(word, word.replace("OUT", str(tmp_path))) for word in words))
+    said = in_process(
+        monkeypatch,
+        capsys,
+        *(there.get(word, word.replace("OUT", str(tmp_path))) for word in words),
+    )
     assert said.stdout or said.stderr
     assert not STEERS.search(said.stdout + said.stderr), ascii(said)
 
@@ -97,7 +107,9 @@ def test_nothing_that_is_printed_steers_the_terminal(evil, tmp_path, monkeypatch
 def test_no_result_steers_the_terminal(evil):
     with RunFile(evil) as file:
         state = fold(file.events())
-    text = "\n".join(map(printable, [*summary_lines(state, evil), headline(state), last_words(evil)]))
+    text = "\n".join(
+        map(printable, [*summary_lines(state, evil), headline(state), last_words(evil)])
+    )
     assert "evil" in text and not STEERS.search(text), ascii(text)
 
 

@@ -27,7 +27,23 @@ from tests.tiers import slow
 # A batch of runs is one test.
 SIZE = 5
 BATCHES = slow(pytest.mark.fuzz, range(int(os.environ.get("DDENV_HOSTILE_BATCHES", "8"))), but=[0])
-KEYS = ("1", "4", "h", "escape", "e", "escape", "E", "escape", "W", "down", "enter", "escape", "escape", "P", "right")
+KEYS = (
+    "1",
+    "4",
+    "h",
+    "escape",
+    "e",
+    "escape",
+    "E",
+    "escape",
+    "W",
+    "down",
+    "enter",
+    "escape",
+    "escape",
+    "P",
+    "right",
+)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +58,9 @@ def hostile(scenes, home):
 
     def made(batch):
         seeds = range(SIZE * batch, SIZE * batch + SIZE)
-        return [(seed, hostile_run(scenes, home / "runs" / f"run-{seed}.ddenv", seed)) for seed in seeds]
+        return [
+            (seed, hostile_run(scenes, home / "runs" / f"run-{seed}.ddenv", seed)) for seed in seeds
+        ]
 
     return made
 
@@ -59,7 +77,9 @@ def of_run(seed):
 
 
 def lines_are_whole(app, columns):
-    lines = ["".join(each.text for each in strip) for strip in app.screen._compositor.render_strips()]
+    lines = [
+        "".join(each.text for each in strip) for strip in app.screen._compositor.render_strips()
+    ]
     return all(cell_len(line) == columns for line in lines)
 
 
@@ -76,14 +96,18 @@ def test_the_scene_is_drawn_or_says_what_is_damaged(hostile, batch):
     for seed, path in hostile(batch):
         sent = []
         with of_run(seed), RunFile(path) as run, engine_lock(path):
-            player = Player(run, Stage(lambda message, _, to=sent: to.append(message)), lambda **_: None)
+            player = Player(
+                run, Stage(lambda message, _, to=sent: to.append(message)), lambda **_: None
+            )
             for now in (0.0, 0.5, 2.0, 9.0):
                 player.tick(now)
             assert sent
             assert json.dumps(player.pairs(), allow_nan=False)
             for test in range(1, 4):
                 with suppress(UserError):
-                    assert json.dumps(player.play(test), allow_nan=False) and player.drawings("way", test)
+                    assert json.dumps(player.play(test), allow_nan=False) and player.drawings(
+                        "way", test
+                    )
 
 
 @pytest.mark.fuzz

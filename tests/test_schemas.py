@@ -31,7 +31,9 @@ def test_all_of_table_one_is_there():
     assert {kind: names - set(schemas.names(kind)) for kind, names in PROMISED.items()} == {
         kind: set() for kind in KINDS
     }
-    pairs = [(part, order) for part in PROMISED["partitioning"] for order in PROMISED["prioritization"]]
+    pairs = [
+        (part, order) for part in PROMISED["partitioning"] for order in PROMISED["prioritization"]
+    ]
     assert {f"{part}/{order}" for part, order in pairs} <= set(schemas.pairs())
 
 
@@ -45,13 +47,17 @@ def test_each_can_be_loaded_and_explains_itself_in_a_paragraph(kind, name):
 
 
 def test_explaining_imports_nothing_numerical():
-    every = "schemas.explanation(kind, name) for kind in schemas.OURS for name in schemas.names(kind)"
+    every = (
+        "schemas.explanation(kind, name) for kind in schemas.OURS for name in schemas.names(kind)"
+    )
     code = f"from ddenv import schemas\nassert all({every})"
     assert loaded(code, "numpy", "sklearn", "scipy") == []
 
 
 def test_an_unknown_name_is_told_with_the_nearest():
-    with pytest.raises(UserError, match=r"no partitioning 'model2mode' \(did you mean model2model\?\); use one of"):
+    with pytest.raises(
+        UserError, match=r"no partitioning 'model2mode' \(did you mean model2model\?\); use one of"
+    ):
         schemas.load("partitioning", "model2mode")
     with pytest.raises(UserError, match=r"no prioritization 'nearest'"):
         schemas.split_pair("timeseg/nearest")
@@ -171,7 +177,9 @@ def test_explaining_imports_no_package_and_tells_nothing_else(plugin):
 
 
 def test_entry_points_may_point_into_classes(plugin):
-    done = plugin("from ddenv import schemas; print(schemas.load('prioritization', 'inside')([1], None))")
+    done = plugin(
+        "from ddenv import schemas; print(schemas.load('prioritization', 'inside')([1], None))"
+    )
     assert done.stdout.splitlines() == ["imported", "[0.0]"]
 
 
@@ -199,7 +207,11 @@ def test_a_schema_that_breaks_its_word_is_told_in_one_line(plugin):
         assert line.startswith("told: ") and words in line, done.stderr
 
 
-BROKEN = {"broken": "cannot be loaded", "no-function": "is not a function", "gone": "cannot be loaded: No module"}
+BROKEN = {
+    "broken": "cannot be loaded",
+    "no-function": "is not a function",
+    "gone": "cannot be loaded: No module",
+}
 
 
 def test_a_broken_package_is_told_in_one_line(plugin):
@@ -213,7 +225,9 @@ def test_a_broken_package_is_told_in_one_line(plugin):
         "        print(error)\n"
     )
     for line, (name, words) in zip(done.stdout.splitlines(), BROKEN.items(), strict=True):
-        assert line.startswith("'' ") and f"prioritization '{name}'" in line and words in line, done.stderr
+        assert line.startswith("'' ") and f"prioritization '{name}'" in line and words in line, (
+            done.stderr
+        )
 
 
 def test_ours_come_first_and_cannot_be_replaced_by_name(plugin):
@@ -221,7 +235,11 @@ def test_ours_come_first_and_cannot_be_replaced_by_name(plugin):
         "from ddenv import schemas\n"
         "print(schemas.names('prioritization')[0], schemas.pairs()[0], schemas.load('algorithm', 'ddenv').__module__)"
     )
-    assert done.stdout.split() == ["failure-proximal", "model2model/failure-proximal", "ddenv.reduction.algorithms"]
+    assert done.stdout.split() == [
+        "failure-proximal",
+        "model2model/failure-proximal",
+        "ddenv.reduction.algorithms",
+    ]
 
 
 def test_each_algorithm_of_ours_has_its_listing_its_words_and_how_many_tests_it_takes():

@@ -11,7 +11,17 @@ from pydantic import ValidationError
 from ddenv.cli.command_line import app
 from ddenv.errors import UserError
 from ddenv.report.run_data import Record
-from ddenv.settings import CHANGEABLE, OPTIONS, PRINTED, SETTINGS, Failure, Reduction, Simulation, put, read
+from ddenv.settings import (
+    CHANGEABLE,
+    OPTIONS,
+    PRINTED,
+    SETTINGS,
+    Failure,
+    Reduction,
+    Simulation,
+    put,
+    read,
+)
 from ddenv.workbench.setup import form
 from ddenv.world.load import load_scenario, validate
 from ddenv.world.scenario import Scenario
@@ -55,10 +65,16 @@ def test_a_scenario_takes_what_is_in_its_range(one):
     step = 1 if one.kind is int else 0.01
     numbers = [number for limit in limits for number in (limit - step, limit, limit + step)]
     others = [float("inf"), float("nan")] if one.kind is float else []
-    values = [one.kind(number) for number in numbers] + others + [*one.choices, "of nobody", None, -1, True, False]
+    values = (
+        [one.kind(number) for number in numbers]
+        + others
+        + [*one.choices, "of nobody", None, -1, True, False]
+    )
     for value in values:
         # Any word can be the name of another package's schema; pydantic makes a number of a truth value.
-        if (one.shown == "method" and isinstance(value, str)) or (isinstance(value, bool) and one.kind is not bool):
+        if (one.shown == "method" and isinstance(value, str)) or (
+            isinstance(value, bool) and one.kind is not bool
+        ):
             continue
         if one.kind is bool and value in (-1, None) and not one.stored:
             continue
@@ -74,7 +90,9 @@ def test_a_scenario_takes_what_is_in_its_range(one):
 
 @EVERY
 def test_it_is_where_it_shows_and_nowhere_else(one):
-    options = {name for command in ("run", "test") for each in parameters(command) for name in each.opts}
+    options = {
+        name for command in ("run", "test") for each in parameters(command) for name in each.opts
+    }
     fields = set(form.FIELDS) | {"algorithm", "pair"}
     assert (one.option in options) == (one.shown != "scenario") or not one.option
     assert (one.name in fields) == (one.shown in ("method", "basic", "more"))
@@ -126,14 +144,22 @@ def test_as_printed_stands_for_what_the_paper_has():
     printed = scenario(as_printed=True)
     assert printed.reduction.as_printed
     assert {name: getattr(printed.reduction, name) for name in PRINTED} == PRINTED
-    assert printed == scenario(growth="paper", skip="known", accept_rate="first", early_stop=False, slice=False)
+    assert printed == scenario(
+        growth="paper", skip="known", accept_rate="first", early_stop=False, slice=False
+    )
     assert not scenario().reduction.as_printed
     assert Scenario.model_validate_json(printed.model_dump_json()) == printed
 
 
 WRONG = {
-    "another": ({"as_printed": True, "growth": "steady"}, "the paper has growth: paper, but growth is 'steady'"),
-    "no truth value": ({"as_printed": "often"}, "reduction.as_printed: should be true or false, found 'often'"),
+    "another": (
+        {"as_printed": True, "growth": "steady"},
+        "the paper has growth: paper, but growth is 'steady'",
+    ),
+    "no truth value": (
+        {"as_printed": "often"},
+        "reduction.as_printed: should be true or false, found 'often'",
+    ),
     "typo": ({"as_print": True}, r"reduction.as_print: unknown key \(did you mean as_printed\?\)"),
 }
 
@@ -156,7 +182,10 @@ def test_it_is_switched_on_and_off_and_leaves_other_variants_alone():
 
 
 def test_what_is_damaged_has_its_default():
-    damaged = {"reduction": {"iterations": "many", "budget": 10**400, "growth": 3, "seed": -1}, "failure": None}
+    damaged = {
+        "reduction": {"iterations": "many", "budget": 10**400, "growth": 3, "seed": -1},
+        "failure": None,
+    }
     for one in OPTIONS:
         value = read(damaged, one)
         assert value == one.default

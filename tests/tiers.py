@@ -12,7 +12,11 @@ SLOW = ("rates", "claims", "fuzz", "terminal", "browser", "examples", "screens",
 
 # A slow machine is no bug.
 settings.register_profile(
-    "quick", max_examples=10, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+    "quick",
+    max_examples=10,
+    derandomize=True,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
 )
 # The examples are always the same: what fails here fails again, and a change is judged by what it changes.
 settings.register_profile("thorough", settings.get_profile("quick"), max_examples=40)

@@ -16,7 +16,9 @@ from itertools import pairwise
 SPEED = 0.5  # m/s
 
 
-def places(corners: list[tuple[float, float]], step: float, waits: float) -> Iterator[tuple[float, float, float]]:
+def places(
+    corners: list[tuple[float, float]], step: float, waits: float
+) -> Iterator[tuple[float, float, float]]:
     """Time (s), x and y (m) along the corners of a path, every `step` s; at its end the robot stands until the time `waits`."""
     time = 0.0
     for (x, y), (to_x, to_y) in pairwise(corners):
@@ -36,7 +38,9 @@ def main(name: str, world: str, seed: str) -> int:
     models = [model.get("name", "") for model in ET.parse(world).getroot().iter("model")]
     corners, reached = rule.way(models, int(seed))
     print("t,x,y,z,qx,qy,qz,qw")
-    for time, x, y in places(corners, rule.STEP, 0.0 if reached else float(os.environ["DDENV_TIMEOUT"])):
+    for time, x, y in places(
+        corners, rule.STEP, 0.0 if reached else float(os.environ["DDENV_TIMEOUT"])
+    ):
         print(f"{time:.1f},{x:.3f},{y:.3f},0.2,0,0,0,1")
     return 0 if reached else 1
 

@@ -55,8 +55,12 @@ RUNS = {
     "ditch": Recorded("ditch", ("--as-printed",)),
     "yard-near": Recorded("yard", reduction=_FROM_END | _PRINTED),
     "yard-far": Recorded("yard", reduction=_FROM_END | _PRINTED | _FAR_FIRST, shown=False),
-    "yard-random": Recorded("yard", reduction=_PRINTED | {"pair": "model2model/random"}, shown=False),
-    "yard-file": Recorded("yard", reduction=_PRINTED | {"pair": "model2model/sequential"}, shown=False),
+    "yard-random": Recorded(
+        "yard", reduction=_PRINTED | {"pair": "model2model/random"}, shown=False
+    ),
+    "yard-file": Recorded(
+        "yard", reduction=_PRINTED | {"pair": "model2model/sequential"}, shown=False
+    ),
     "nailed-near": Recorded("nailed", reduction=_FROM_END | _PRINTED, shown=False),
     "quay-first": Recorded("quay", ("--as-printed", "--seed", "4")),
     "quay-kept": Recorded("quay", certify_rate=0.8),
@@ -81,8 +85,21 @@ def record(name: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
         run = Path(folder) / f"{name}.ddenv"
         toy = TOYS.get(recorded.world)
-        what = recorded.world if toy is None else str(written(toy, Path(folder), recorded.reduction))
-        command = (sys.executable, "-m", "ddenv", "run", what, "--jobs", "1", "--output", str(run), *recorded.options)
+        what = (
+            recorded.world if toy is None else str(written(toy, Path(folder), recorded.reduction))
+        )
+        command = (
+            sys.executable,
+            "-m",
+            "ddenv",
+            "run",
+            what,
+            "--jobs",
+            "1",
+            "--output",
+            str(run),
+            *recorded.options,
+        )
         more = (
             sys.executable,
             "-m",
@@ -144,14 +161,26 @@ def _collision(number: int, box: Box) -> str:
 
 def delivery_oracle() -> str:
     """The outcome of every part of the first lesson's world."""
-    outcomes = {" ".join(kept): outcome(kept) for kept in _subsets(DELIVERY.names) if outcome(kept) != "pass"}
-    return json.dumps({"models": DELIVERY.names, "otherwise": "pass", "outcomes": outcomes}, indent=0) + "\n"
+    outcomes = {
+        " ".join(kept): outcome(kept)
+        for kept in _subsets(DELIVERY.names)
+        if outcome(kept) != "pass"
+    }
+    return (
+        json.dumps({"models": DELIVERY.names, "otherwise": "pass", "outcomes": outcomes}, indent=0)
+        + "\n"
+    )
 
 
 def quay_oracle() -> str:
     """The rate of f in every part of the quay's world."""
     rates = {" ".join(kept): round(rate(kept), 3) for kept in _subsets(QUAY.names) if rate(kept)}
-    return json.dumps({"models": QUAY.names, "otherwise": "pass", "outcomes": {}, "rates": rates}, indent=0) + "\n"
+    return (
+        json.dumps(
+            {"models": QUAY.names, "otherwise": "pass", "outcomes": {}, "rates": rates}, indent=0
+        )
+        + "\n"
+    )
 
 
 # What is known of the whole world of a run.
@@ -165,8 +194,17 @@ def _subsets(names: tuple[str, ...]) -> list[tuple[str, ...]]:
 def told(run: str) -> set[int]:
     """The tests of a run whose ends a lesson tells."""
     lessons = [yaml.safe_load(file.read_text(encoding="utf-8")) for file in LESSONS.glob("*.yaml")]
-    places = [str(step.get("at", "")) for lesson in lessons if lesson["run"] == run for step in lesson["steps"]]
-    return {int(number) for word, _, number in (place.partition(" ") for place in places) if word in ("test", "result")}
+    places = [
+        str(step.get("at", ""))
+        for lesson in lessons
+        if lesson["run"] == run
+        for step in lesson["steps"]
+    ]
+    return {
+        int(number)
+        for word, _, number in (place.partition(" ") for place in places)
+        if word in ("test", "result")
+    }
 
 
 def slim(run: Path, shown: bool, told: set[int]) -> None:
@@ -181,7 +219,11 @@ def slim(run: Path, shown: bool, told: set[int]) -> None:
         sys.exit(f"{run.name}: did not come to its end")
     kept = {test for one in events if (test := getattr(one.event, "evidence_test", None))}
     kept |= set(state.failures) | ({state.baseline.failure_test} if state.baseline else set())
-    made_for = {(test.round, test.candidate) for test in state.tests if test.id in told and test.phase == "round"}
+    made_for = {
+        (test.round, test.candidate)
+        for test in state.tests
+        if test.id in told and test.phase == "round"
+    }
     kept |= told | {test.id for test in state.tests if (test.round, test.candidate) in made_for}
     database = sqlite3.connect(run)
     tests = ",".join(map(str, sorted(kept))) if shown else ""

@@ -88,10 +88,21 @@ def _play(name: str, oracle: Oracle, known: dict[str, Any]) -> list[dict[str, An
     chosen: dict[str, Any] = {"algorithm": name}
     if "/" in name:
         partitioning, prioritization = schemas.split_pair(name)
-        chosen = {"algorithm": "ddenv", "partitioning": partitioning, "prioritization": prioritization}
+        chosen = {
+            "algorithm": "ddenv",
+            "partitioning": partitioning,
+            "prioritization": prioritization,
+        }
     # The oracle is steady: no call is repeated.
     steady: dict[str, Any] = {"iterations": 0, "check": False}
-    reduce(oracle.models, test, **chosen, **known, **steady, on_round=lambda round: rounds.append((round, [])))
+    reduce(
+        oracle.models,
+        test,
+        **chosen,
+        **known,
+        **steady,
+        on_round=lambda round: rounds.append((round, [])),
+    )
     return [_recorded(round, tested) for round, tested in rounds if tested]
 
 
@@ -99,9 +110,14 @@ def _recorded(round: NamedRound, tested: list[frozenset[str]]) -> dict[str, Any]
     whole, labels = frozenset(round.environment), dict[frozenset[str], str]()
     for kind, number in round.candidates:
         part, letter = frozenset(round.partitions[number]), partition_letter(number)
-        models, label = (part, f"part {letter}") if kind == "partition" else (whole - part, f"without {letter}")
+        models, label = (
+            (part, f"part {letter}") if kind == "partition" else (whole - part, f"without {letter}")
+        )
         labels[models] = label
-    return {"parts": [" ".join(part) for part in round.partitions], "tested": [labels[models] for models in tested]}
+    return {
+        "parts": [" ".join(part) for part in round.partitions],
+        "tested": [labels[models] for models in tested],
+    }
 
 
 if __name__ == "__main__":

@@ -25,7 +25,11 @@ class Toy:
         return tuple(dict.fromkeys(name for name, *_ in self.models))
 
 
-_YARD_WALLS = (("wall_left", 0, 2.6, 14, 0.3), ("wall_right", 0, -2.6, 14, 0.3), ("island", 1, 0, 4.6, 0.5))
+_YARD_WALLS = (
+    ("wall_left", 0, 2.6, 14, 0.3),
+    ("wall_right", 0, -2.6, 14, 0.3),
+    ("island", 1, 0, 4.6, 0.5),
+)
 _YARD_MODELS = (
     ("bench", -5.2, 1.6, 1.2, 0.6),
     ("sign", -2.9, 1.9, 0.4, 0.4),
@@ -69,7 +73,9 @@ def _scenario(name: str, description: str, rule: str, **sections: dict[str, Any]
     }
 
 
-_DELIVERY = "A delivery robot drives from one end of a yard to the other. It gets stuck in the left lane."
+_DELIVERY = (
+    "A delivery robot drives from one end of a yard to the other. It gets stuck in the left lane."
+)
 DELIVERY = Toy(
     "delivery",
     _YARD_WALLS,
@@ -86,11 +92,18 @@ YARD = Toy(
     "delivery",
     _YARD_WALLS,
     (*_YARD_MODELS, *_MORE_OF_YARD),
-    _scenario("yard", _DELIVERY, "delivery", reduction={"accept_rate": "first", "baseline_runs": 1, "iterations": 0}),
+    _scenario(
+        "yard",
+        _DELIVERY,
+        "delivery",
+        reduction={"accept_rate": "first", "baseline_runs": 1, "iterations": 0},
+    ),
 )
 _SIGN = tuple(box for box in YARD.models if box[0] == "sign")
 # The same yard, with a sign that always stays: all that f needs then is near to where the robot gets stuck.
-NAILED = replace(YARD, walls=(*YARD.walls, *_SIGN), models=tuple(box for box in YARD.models if box not in _SIGN))
+NAILED = replace(
+    YARD, walls=(*YARD.walls, *_SIGN), models=tuple(box for box in YARD.models if box not in _SIGN)
+)
 QUAY = Toy(
     "quay",
     (("kerb_left", 0, 2.6, 14, 0.3), ("kerb_right", 0, -2.6, 14, 0.3)),
@@ -108,6 +121,8 @@ QUAY = Toy(
         ("crate", 4.5, 0.7, 0.6, 0.6),
         ("lamp", 5.3, 1.9, 0.3, 0.3),
     ),
-    _scenario("quay", "A robot drives along a quay. Off its line it gets stuck at the gate.", "quay"),
+    _scenario(
+        "quay", "A robot drives along a quay. Off its line it gets stuck at the gate.", "quay"
+    ),
 )
 TOYS = {"delivery": DELIVERY, "yard": YARD, "nailed": NAILED, "quay": QUAY}

@@ -90,7 +90,9 @@ def models(repaired: bool) -> Iterator[str]:
     for number, (side, distance, y, degrees) in enumerate(places, start=1):
         x = side * (GAP / 2 + distance)
         parts = tile(random.Random(number))
-        yield pieces.model(f"rough_tile_{number:02d}", (x, y, TOP, 0, 0, math.radians(degrees)), parts)
+        yield pieces.model(
+            f"rough_tile_{number:02d}", (x, y, TOP, 0, 0, math.radians(degrees)), parts
+        )
     yield pieces.model("cinder_block", (GAP / 2 + 3.4, -0.9, TOP, 0, 0, 0.4), cinder_block())
 
 

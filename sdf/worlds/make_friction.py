@@ -61,7 +61,9 @@ def barrel(number: int, x: float, y: float) -> str:
     high = BARREL_HEIGHT / len(STRIPES)
     for stripe, color in enumerate(STRIPES):
         middle = (0, 0, high * (stripe + 0.5))
-        parts += pieces.visual(f"stripe_{stripe + 1}", middle, pieces.round_shape(BARREL_RADIUS, high), color)
+        parts += pieces.visual(
+            f"stripe_{stripe + 1}", middle, pieces.round_shape(BARREL_RADIUS, high), color
+        )
     return pieces.model(f"barrel_{number:02d}", on_road(x, y), parts)
 
 

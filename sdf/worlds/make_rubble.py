@@ -31,7 +31,9 @@ LOOSE = [
 ]  # fmt: skip
 
 
-def board(name: str, x: float, y: float, z: float, pitch: float, yaw: float, length: float, on_edge: bool) -> str:
+def board(
+    name: str, x: float, y: float, z: float, pitch: float, yaw: float, length: float, on_edge: bool
+) -> str:
     """A board with its centre at (x, y, z)."""
     size = (length, THICK, WIDE) if on_edge else (length, WIDE, THICK)
     mass = DENSITY * length * THICK * WIDE
@@ -49,7 +51,9 @@ def crib(side: int) -> Iterator[str]:
             place = (offset, y) if across else (0.0, y + offset)
             yaw = math.pi / 2 if across else 0.0
             z = WIDE * (layer + 0.5)
-            yield board(f"crib_{name}_{2 * layer + number + 1:02d}", *place, z, 0.0, yaw, CRIB, on_edge=True)
+            yield board(
+                f"crib_{name}_{2 * layer + number + 1:02d}", *place, z, 0.0, yaw, CRIB, on_edge=True
+            )
 
 
 def block(number: int, x: float, y: float) -> str:
@@ -68,7 +72,9 @@ def ramp(number: int, x: float, y: float) -> Iterator[str]:
     mx, mz = front - along * math.cos(pitch), BLOCK[2] - along * math.sin(pitch)
     mx, mz = mx - math.sin(pitch) * THICK / 2, mz + math.cos(pitch) * THICK / 2
     for half, offset in (("a", 0.11), ("b", -0.11)):
-        yield board(f"ramp_{number}{half}", mx, y + offset, mz + 0.002, -pitch, 0.0, RAMP, on_edge=False)
+        yield board(
+            f"ramp_{number}{half}", mx, y + offset, mz + 0.002, -pitch, 0.0, RAMP, on_edge=False
+        )
 
 
 def models(repaired: bool) -> Iterator[str]:
@@ -80,7 +86,16 @@ def models(repaired: bool) -> Iterator[str]:
     yield from crib(1)
     yield from crib(-1)
     for number, (x, y, degrees, length) in enumerate(LOOSE, start=1):
-        yield board(f"board_{number:02d}", x, y, THICK / 2, 0.0, math.radians(degrees), length, on_edge=False)
+        yield board(
+            f"board_{number:02d}",
+            x,
+            y,
+            THICK / 2,
+            0.0,
+            math.radians(degrees),
+            length,
+            on_edge=False,
+        )
 
 
 def rubble(repaired: bool = False) -> str:

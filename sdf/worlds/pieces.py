@@ -33,7 +33,9 @@ def material(color: str) -> str:
 
 def part(name: str, position: Sequence[float], geometry: str, mu: float, color: str) -> str:
     """A collision and a visual of the same shape. SDF wants different names for all parts of a link."""
-    return collision(name, position, geometry, mu) + visual(f"{name}_visual", position, geometry, color)
+    return collision(name, position, geometry, mu) + visual(
+        f"{name}_visual", position, geometry, color
+    )
 
 
 def collision(name: str, position: Sequence[float], geometry: str, mu: float) -> str:
@@ -69,9 +71,13 @@ def box_inertial(mass: float, size: Sequence[float]) -> str:
     """The inertia of a solid box (kg, m) about its centre."""
     x, y, z = (side * side for side in size)
     moments = {"ixx": y + z, "iyy": x + z, "izz": x + y}
-    inertia = "".join(f"<{name}>{mass / 12 * value:.6g}</{name}>" for name, value in moments.items())
+    inertia = "".join(
+        f"<{name}>{mass / 12 * value:.6g}</{name}>" for name, value in moments.items()
+    )
     zeros = "".join(f"<{name}>0</{name}>" for name in ("ixy", "ixz", "iyz"))
-    return f"        <inertial><mass>{mass:g}</mass><inertia>{inertia}{zeros}</inertia></inertial>\n"
+    return (
+        f"        <inertial><mass>{mass:g}</mass><inertia>{inertia}{zeros}</inertia></inertial>\n"
+    )
 
 
 def ground(color: str, mu: float | None = None, pose: Sequence[float] = ()) -> str:

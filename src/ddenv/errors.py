@@ -13,4 +13,6 @@ class UserError(Exception):
 
     def __init__(self, message: str) -> None:
         line = plain(message)
-        super().__init__(line if len(line) <= LONGEST else f"{line[: LONGEST - 300]} ... {line[-290:]}")
+        super().__init__(
+            line if len(line) <= LONGEST else f"{line[: LONGEST - 300]} ... {line[-290:]}"
+        )

@@ -60,7 +60,9 @@ def names(kind: Kind) -> tuple[str, ...]:
 def pairs() -> tuple[str, ...]:
     """All pairs of a partitioning with a prioritization, written `model2model/failure-proximal`."""
     orders = names("prioritization")
-    return tuple(f"{partitioning}/{order}" for partitioning in names("partitioning") for order in orders)
+    return tuple(
+        f"{partitioning}/{order}" for partitioning in names("partitioning") for order in orders
+    )
 
 
 def uses(algorithm: str) -> tuple[Kind, ...]:
@@ -72,7 +74,9 @@ def split_pair(pair: str) -> tuple[str, str]:
     """The partitioning and the prioritization of a pair, both known. Raises UserError."""
     partitioning, slash, prioritization = pair.partition("/")
     if not slash:
-        raise UserError(f"'{pair}' is not a pair{nearest(pair, pairs())}; write partitioning/prioritization")
+        raise UserError(
+            f"'{pair}' is not a pair{nearest(pair, pairs())}; write partitioning/prioritization"
+        )
     check("partitioning", partitioning)
     check("prioritization", prioritization)
     return partitioning, prioritization
@@ -159,5 +163,9 @@ def _known(kind: Kind) -> dict[str, EntryPoint]:
     group = f"ddenv.{kind}s"
     ours = {name: EntryPoint(name, value, group) for name, value in OURS[kind].items()}
     # A name with a slash would look like a pair.
-    others = {each.name: each for each in _installed()[kind] if each.name not in ours and "/" not in each.name}
+    others = {
+        each.name: each
+        for each in _installed()[kind]
+        if each.name not in ours and "/" not in each.name
+    }
     return ours | others

@@ -87,7 +87,9 @@ class Setting:
         if self.least is None:
             return ""
         return (
-            f"{self.least:g} or more" if self.most is None else f"{number_text(self.least)} to {number_text(self.most)}"
+            f"{self.least:g} or more"
+            if self.most is None
+            else f"{number_text(self.least)} to {number_text(self.most)}"
         )
 
     @property
@@ -112,12 +114,20 @@ class Setting:
         if not isinstance(value, int if self.kind is int else (int, float)):
             return False
         high = self.most is None or value <= self.most
-        return high and (value > self.above if self.above is not None else self.least is None or value >= self.least)
+        return high and (
+            value > self.above
+            if self.above is not None
+            else self.least is None or value >= self.least
+        )
 
 
 def number_text(value: Value) -> str:
     """A value as short as it can be typed."""
-    return str(int(value)) if isinstance(value, float) and value.is_integer() and abs(value) < 1e9 else str(value)
+    return (
+        str(int(value))
+        if isinstance(value, float) and value.is_integer() and abs(value) < 1e9
+        else str(value)
+    )
 
 
 def setting(default: Value, meaning: str, **more: Any) -> Any:
@@ -174,7 +184,9 @@ class Reduction:
         "the seed of run i: a hash of the seed and i (hashed), or seed + i (consecutive)",
         more="Consecutive is for simulators that use the seed as an index; poor generators draw similar numbers from them.",
     )
-    baseline_runs: int = setting(10, "runs of the whole world before the first round", least=1, most=1000, shown="more")
+    baseline_runs: int = setting(
+        10, "runs of the whole world before the first round", least=1, most=1000, shown="more"
+    )
     failure: int = setting(
         1,
         "which failure of the whole world is reduced; 1 is the most frequent one",
@@ -288,7 +300,9 @@ class Reduction:
         printed="paper",
         used_by=("ddenv",),
     )
-    n_partitions: int = setting(2, "partitions in the first round", least=2, most=100_000, used_by=("ddenv",))
+    n_partitions: int = setting(
+        2, "partitions in the first round", least=2, most=100_000, used_by=("ddenv",)
+    )
     delta: float = setting(
         0.5,
         "change of angular velocity at which trajectoryseg cuts",
@@ -305,7 +319,9 @@ class Reduction:
 class Failure:
     """What counts as the same failure: still short of the goal at `timeout`, within `epsilon` of where f ended."""
 
-    timeout: float = setting(45.0, "simulated time the robot has", unit="s", least=0.01, most=100_000, shown="basic")
+    timeout: float = setting(
+        45.0, "simulated time the robot has", unit="s", least=0.01, most=100_000, shown="basic"
+    )
     epsilon: float = setting(
         0.33,
         "maximum distance between the ends of two similar failures",
@@ -329,8 +345,12 @@ class Simulation:
     bounds the memory of one worker; None for its share of what the machine allows.
     """
 
-    time_step: float = setting(0.005, "time step of the simulation", unit="s", least=0.0001, most=0.05)
-    contact: Literal["lagged", "sap", "similar"] = setting("lagged", "Drake's approximation of contact")
+    time_step: float = setting(
+        0.005, "time step of the simulation", unit="s", least=0.0001, most=0.05
+    )
+    contact: Literal["lagged", "sap", "similar"] = setting(
+        "lagged", "Drake's approximation of contact"
+    )
     wall_timeout: float | None = setting(
         None,
         "maximum real time of one test without its preparation; by default 1800 in the baseline, then set by its speed",
@@ -355,23 +375,39 @@ def declared(section: str, declaration: type) -> Iterator[Setting]:
         choices = get_args(hint) if get_origin(hint) is Literal else ()
         # The first type of a union with None is that of a value.
         kind = str if choices else (*get_args(hint), hint)[0]
-        yield replace(vars(declaration)[name], section=section, name=name, kind=kind, choices=choices)
+        yield replace(
+            vars(declaration)[name], section=section, name=name, kind=kind, choices=choices
+        )
 
 
 SECTIONS: dict[str, type] = {"reduction": Reduction, "failure": Failure, "simulation": Simulation}
 SETTINGS: dict[str, Setting] = {
-    each.name: each for section, declaration in SECTIONS.items() for each in declared(section, declaration)
+    each.name: each
+    for section, declaration in SECTIONS.items()
+    for each in declared(section, declaration)
 }
 OPTIONS = tuple(each for each in SETTINGS.values() if each.option)
 CHANGEABLE = tuple(each.name for each in SETTINGS.values() if each.may_change)
-PRINTED: dict[str, Value] = {each.name: each.printed for each in SETTINGS.values() if each.printed is not None}
+PRINTED: dict[str, Value] = {
+    each.name: each.printed for each in SETTINGS.values() if each.printed is not None
+}
 # Not in a scenario, since it does not change the result.
-JOBS = Setting(default=None, meaning="tests at the same time", least=1, most=1024, shown="basic", name="jobs", kind=int)
+JOBS = Setting(
+    default=None,
+    meaning="tests at the same time",
+    least=1,
+    most=1024,
+    shown="basic",
+    name="jobs",
+    kind=int,
+)
 
 
 def is_printed(reduction: Mapping[str, Any]) -> bool:
     """Whether a scenario's section `reduction` asks for the paper's algorithm to the letter."""
-    return all(reduction.get(name, SETTINGS[name].default) == value for name, value in PRINTED.items())
+    return all(
+        reduction.get(name, SETTINGS[name].default) == value for name, value in PRINTED.items()
+    )
 
 
 def read(scenario: Mapping[str, Any], one: Setting) -> Value:

@@ -126,7 +126,11 @@ def between(low: float, high: float) -> str:
 def about(middle: float, low: float = 0.0, high: float = 0.0) -> str:
     """An estimated time in s, with its interval if there is one: 2 min (1 to 5)."""
     unit, name = (1.0, "s") if middle < 90 else (60.0, "min") if middle < 5400 else (3600.0, "h")
-    interval = f" ({between(low / unit, high / unit)})" if rounded(low / unit) < rounded(high / unit) else ""
+    interval = (
+        f" ({between(low / unit, high / unit)})"
+        if rounded(low / unit) < rounded(high / unit)
+        else ""
+    )
     return f"{rounded(middle / unit):,} {name}{interval}"
 
 

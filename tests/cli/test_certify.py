@@ -22,12 +22,20 @@ def test_a_result_is_told_with_its_runs_and_what_they_mean(run):
     left, first, second = found["certificate"]["claims"]
     assert (left["without"], left["verdict"], left["outcomes"]) == (None, "kept", {"similar": 23})
     assert left["means"] == "keeps at least 81 % of the whole world's rate"
-    assert (first["without"], first["rate"], second["shown"], second["runs"]) == ("crate_00", 0.0, 1, 12)
-    assert (left["keeps_at_least"], second["without_at_most"]) == pytest.approx((0.81, 0.61), abs=0.01)
+    assert (first["without"], first["rate"], second["shown"], second["runs"]) == (
+        "crate_00",
+        0.0,
+        1,
+        12,
+    )
+    assert (left["keeps_at_least"], second["without_at_most"]) == pytest.approx(
+        (0.81, 0.61), abs=0.01
+    )
     assert found["certificate"]["whole_world"]["outcomes"] == {"similar": 22, "pass": 1}
     assert "minimal environment: 2 of 11 models" in lines
     assert (
-        "what is left: f in 23 of 23 fresh runs (80 % to 100 %): keeps at least 81 % of the whole world's rate" in lines
+        "what is left: f in 23 of 23 fresh runs (80 % to 100 %): keeps at least 81 % of the whole world's rate"
+        in lines
     )
     assert (
         "without crate_01: f in 1 of 12 fresh runs (<1 % to 48 %): needed: without it f shows at most 62 % as often"
@@ -44,7 +52,10 @@ def test_a_result_with_a_certificate_says_what_can_be_done_with_it(run, home):
         "'ddenv isolate crates-1' finds a nearest world that passes, "
         "'ddenv export crates-1 --bundle crates-1.zip' packs it for others"
     )
-    assert not any(line.startswith("next:") for line in summary_lines(replace(state, status="stopped"), run.path))
+    assert not any(
+        line.startswith("next:")
+        for line in summary_lines(replace(state, status="stopped"), run.path)
+    )
 
 
 def test_a_nearest_world_that_passes_is_offered_until_it_is_known(run):
@@ -53,14 +64,19 @@ def test_a_nearest_world_that_passes_is_offered_until_it_is_known(run):
 
 
 def test_what_only_helps_can_be_left_out_by_a_key(run):
-    assert "shows it, and H in it leaves crate_01 out, 'ddenv why" in told(fake_moments.helped(run))[1]
+    assert (
+        "shows it, and H in it leaves crate_01 out, 'ddenv why" in told(fake_moments.helped(run))[1]
+    )
 
 
 def test_what_is_not_shown_is_not_called_minimal(run):
     found, lines = told(fake_moments.not_shown(run))
     assert (found["minimal"], found["certificate"]["minimal"]) == (False, False)
     assert "environment, not shown to be minimal: 2 of 11 models" in lines
-    assert "without crate_01: f in 1 of 2 fresh runs (1 % to 99 %): unknown: too many runs broke" in lines
+    assert (
+        "without crate_01: f in 1 of 2 fresh runs (1 % to 99 %): unknown: too many runs broke"
+        in lines
+    )
     assert " tests broke; the last one: " in lines
 
 

@@ -40,7 +40,9 @@ def reduced(made_once):
 
     def make(folder):
         home = os.environ | {"DDENV_HOME": str(folder)}
-        done = ddenv("run", WALL, "--json", "--jobs", 2, "--output", folder / "minimal.sdf", env=home)
+        done = ddenv(
+            "run", WALL, "--json", "--jobs", 2, "--output", folder / "minimal.sdf", env=home
+        )
         assert done.returncode == 0, done.stderr
         (folder / "summary.json").write_text(done.stdout)
 
@@ -57,7 +59,11 @@ def test_a_reduction_finds_the_two_that_matter(reduced):
     assert (summary["models_before"], summary["models_after"]) == (6, 2)
     assert sum(summary["outcomes"].values()) == summary["tests"]
     assert summary["rate_left"]["rate"] == summary["rate_whole_world"]["rate"] == 1.0
-    assert [claim["verdict"] for claim in summary["certificate"]["claims"]] == ["kept", "needed", "needed"]
+    assert [claim["verdict"] for claim in summary["certificate"]["claims"]] == [
+        "kept",
+        "needed",
+        "needed",
+    ]
     assert summary["outcomes"]["pass"] > 0
     assert set(summary) >= {"deflake_runs", "rounds", "wall_seconds", "run_file"}
 
@@ -67,7 +73,11 @@ def test_the_minimal_world_fails_as_the_run_did_and_without_its_model_it_does_no
     folder, summary = reduced
     run = summary["run_file"]
     assert _outcomes(ddenv("test", run, "--minimal", "--repeat", 3, "--json")) == ["similar"] * 3
-    assert _outcomes(ddenv("test", run, "--minimal", "--leave-each-out", "--json")) == ["similar", "pass", "pass"]
+    assert _outcomes(ddenv("test", run, "--minimal", "--leave-each-out", "--json")) == [
+        "similar",
+        "pass",
+        "pass",
+    ]
     assert _outcomes(ddenv("test", run, "--keep", "beam,post", "--seed", 7, "--json")) == ["pass"]
     assert _outcomes(ddenv("test", WALL, "--world", folder / "minimal.sdf", "--json")) == ["failed"]
 
@@ -79,7 +89,11 @@ def test_a_test_of_a_run_is_made_again_by_its_number(reduced):
         tests = fold(file.events()).tests
     test = next(test for test in tests if test.phase == "round" and test.outcome == "pass")
     (again,) = json.loads(ddenv("test", run, "--test", test.id, "--json").stdout)["runs"]
-    assert (again["outcome"], again["seed"], tuple(again["end_pose"])) == ("pass", test.seed, test.end_pose)
+    assert (again["outcome"], again["seed"], tuple(again["end_pose"])) == (
+        "pass",
+        test.seed,
+        test.end_pose,
+    )
 
 
 def _outcomes(done):
@@ -92,12 +106,16 @@ def test_the_streams_of_runs_are_those_of_their_trajectories(reduced, tmp_path):
     _, summary = reduced
     done = ddenv("export", summary["run_file"], "--mcap", tmp_path / "one.mcap")
     assert done.returncode == 0, done.stderr
-    assert [line.split(":")[0].strip() for line in done.stdout.splitlines()[1:]] == ["/whole", "/left", "/passing"]
+    assert [line.split(":")[0].strip() for line in done.stdout.splitlines()[1:]] == [
+        "/whole",
+        "/left",
+        "/passing",
+    ]
     places, said = {}, []
     with (tmp_path / "one.mcap").open("rb") as file:
-        for _, channel, _, message in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(
-            ["/tf", "/result"]
-        ):
+        for _, channel, _, message in make_reader(
+            file, decoder_factories=[DecoderFactory()]
+        ).iter_decoded_messages(["/tf", "/result"]):
             if channel.topic == "/result":
                 said.append(message.data)
                 continue
@@ -109,7 +127,9 @@ def test_the_streams_of_runs_are_those_of_their_trajectories(reduced, tmp_path):
         state = fold(run.events())
         assert said == [shown(state)]
         trajectory = run.trajectory(state.f_test.id)
-    assert places["whole/base_link"] == list(zip(trajectory[1::COLUMNS], trajectory[2::COLUMNS], strict=True))
+    assert places["whole/base_link"] == list(
+        zip(trajectory[1::COLUMNS], trajectory[2::COLUMNS], strict=True)
+    )
     assert ddenv("export", summary["run_file"], "--mcap", tmp_path / "one.mcap").returncode == 2
 
 
@@ -119,7 +139,11 @@ def test_with_early_stop_a_robot_that_still_pushes_is_watched_to_the_end(home, r
     done = ddenv("run", WALL, "--json", "--jobs", 2, "--timeout", 14, "--early-stop", "--no-slice")
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
-    assert (summary["kept"], summary["minimal"], summary["failure"]) == (reduced[1]["kept"], True, "stuck")
+    assert (summary["kept"], summary["minimal"], summary["failure"]) == (
+        reduced[1]["kept"],
+        True,
+        "stuck",
+    )
     assert summary["ended_early"] == 0
     assert "certificate 1: fresh runs of what is left (2 models)" in done.stderr
 
@@ -183,33 +207,57 @@ def test_a_second_engine_is_refused(reduced, tmp_path, command):
 MISTAKES = {
     "no scenario": (["run", "dich"], "did you mean ditch?"),
     "no file": (["run", "nothing.yaml"], "no such file"),
-    "pair": (["run", WALL, "--pair", "model2model/nearest"], "ddenv: --pair: 'model2model/nearest' is not allowed"),
-    "no pair": (["run", WALL, "--pair", "model2model"], "--pair: 'model2model' is not allowed (did you mean"),
+    "pair": (
+        ["run", WALL, "--pair", "model2model/nearest"],
+        "ddenv: --pair: 'model2model/nearest' is not allowed",
+    ),
+    "no pair": (
+        ["run", WALL, "--pair", "model2model"],
+        "--pair: 'model2model' is not allowed (did you mean",
+    ),
     "algorithm": (
         ["run", WALL, "--algorithm", "ddmn"],
         f"ddenv: --algorithm: 'ddmn' is not allowed (did you mean ddmin?); use one of {', '.join(names('algorithm'))}",
     ),
     "epsilon": (["run", WALL, "--epsilon", "0"], "--epsilon: expected 0.001 to 1000, found 0"),
-    "iterations": (["run", WALL, "--iterations", "-1"], "--iterations: expected 0 to 1000, found -1"),
+    "iterations": (
+        ["run", WALL, "--iterations", "-1"],
+        "--iterations: expected 0 to 1000, found -1",
+    ),
     "timeout": (["run", WALL, "--timeout", "0"], "--timeout: expected 0.01 to 100000, found 0"),
     "not a number": (["run", WALL, "--seed", "x"], "'--seed': 'x' is not a valid integer"),
     "jobs": (["run", WALL, "--jobs", "0"], "'--jobs': 0 is not in the range 1<=x<=1024"),
     "unknown option": (["run", WALL, "--fast"], "No such option"),
     "nearly an option": (["run", WALL, "--sped", "1"], "Did you mean '--seed'?; see"),
-    "unlike any option": (["world", "check", WALL, "--spawn", "1"], "No such option '--spawn'; see"),
-    "endless": (["run", WALL, "--timeout", "1e300"], "--timeout: expected 0.01 to 100000, found 1e+300"),
+    "unlike any option": (
+        ["world", "check", WALL, "--spawn", "1"],
+        "No such option '--spawn'; see",
+    ),
+    "endless": (
+        ["run", WALL, "--timeout", "1e300"],
+        "--timeout: expected 0.01 to 100000, found 1e+300",
+    ),
     "far away": (["run", WALL, "--spawn", "1e300,0,0,0"], "no number may exceed"),
-    "unknown command": (["certfy"], "no command, run, scenario or world 'certfy' (did you mean certify?)"),
+    "unknown command": (
+        ["certfy"],
+        "no command, run, scenario or world 'certfy' (did you mean certify?)",
+    ),
     "missing world": (["depot.world"], "ddenv: depot.world: no such file"),
     "missing run": (["there/depot.ddenv"], "ddenv: there/depot.ddenv: no such run file"),
     "folder to run": (["run", DATA], "is a folder; expected a scenario's name or file"),
     "folder to open": (["open", DATA], "is a folder; expected a run, a scenario or a world"),
-    "spawn inside": (["run", DATA / "wall.sdf", "--spawn", "2,0,0.5,0", "--goal", "4,0"], "inside model 'wall'"),
+    "spawn inside": (
+        ["run", DATA / "wall.sdf", "--spawn", "2,0,0.5,0", "--goal", "4,0"],
+        "inside model 'wall'",
+    ),
     "no spawn": (
         ["run", DATA / "wall.sdf"],
         "needs a start and a goal, such as --spawn 0,0,0.2,0 --goal 9,0",
     ),
-    "bad spawn": (["run", DATA / "wall.sdf", "--spawn", "a,b", "--goal", "4,0"], "expected x,y,z,yaw"),
+    "bad spawn": (
+        ["run", DATA / "wall.sdf", "--spawn", "a,b", "--goal", "4,0"],
+        "expected x,y,z,yaw",
+    ),
     "name": (["run", WALL, "--name", "../x"], "is not a valid file name"),
     "no run": (["open", "nothing"], "no such run file"),
     "no runs": (["certify", "nothing", "--runs", "0"], "'--runs': 0 is not in the range x>=1"),
@@ -227,9 +275,15 @@ MISTAKES = {
     "no world to check": (["world", "check", "nowhere.sdf"], "nowhere.sdf: no such file"),
     "folder to show": (["world", "show", DATA], "is a folder"),
     "no scenario to check": (["world", "check", "frction"], "frction: no such file"),
-    "stand-in": (["world", "check", DATA / "wall.sdf", "--stand-in", "x"], "--stand-in: expected URI=SHAPE"),
+    "stand-in": (
+        ["world", "check", DATA / "wall.sdf", "--stand-in", "x"],
+        "--stand-in: expected URI=SHAPE",
+    ),
     "ignore": (["world", "check", DATA / "wall.sdf", "--ignore", "walls"], "'walls' is not one of"),
-    "no folder to write to": (["world", "convert", DATA / "wall.sdf", "-o", "/no/where/x.sdf"], "cannot be written"),
+    "no folder to write to": (
+        ["world", "convert", DATA / "wall.sdf", "-o", "/no/where/x.sdf"],
+        "cannot be written",
+    ),
 }
 
 
@@ -254,9 +308,16 @@ def test_options_on_the_reduction_reach_the_run(home):
         "seed": 4,
         "timeout": 12.5,
     }
-    words = [word for key, value in options.items() for word in (f"--{key.replace('_', '-')}", str(value))]
+    words = [
+        word
+        for key, value in options.items()
+        for word in (f"--{key.replace('_', '-')}", str(value))
+    ]
     words += ["--early-stop", "--epsilon", "0.2", "--as-printed"]
-    assert app(["run", WALL, *words, "--output", str(home / "asked.ddenv")], standalone_mode=False) == 0
+    assert (
+        app(["run", WALL, *words, "--output", str(home / "asked.ddenv")], standalone_mode=False)
+        == 0
+    )
     assert app(["run", WALL, "--output", str(home / "plain.ddenv")], standalone_mode=False) == 0
     with RunFile(home / "asked.ddenv") as asked, RunFile(home / "plain.ddenv") as plain:
         own, found = read_parts(plain)[0], read_parts(asked)[0]
@@ -281,7 +342,12 @@ def test_without_a_screen_nobody_is_asked(home):
     from ddenv.world.load import load_scenario
 
     scenario = load_scenario(DATA / "wall.yaml")
-    create_run(scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update={"budget": 25})}), run)
+    create_run(
+        scenario.model_copy(
+            update={"reduction": scenario.reduction.model_copy(update={"budget": 25})}
+        ),
+        run,
+    )
     with RunFile(run) as viewer:
         viewer.send("accept_mode", mode="ask")
     done = ddenv("resume", run, "--json")
@@ -295,17 +361,24 @@ def test_a_scenario_cannot_name_a_run_out_of_its_folder(home):
     data["robot"]["model"] = str(DATA.parents[1] / "sdf" / "robots" / "husky.sdf")
     (home / "s.yaml").write_text(yaml.safe_dump(data))
     (home / "in").mkdir()
-    summary = json.loads(ddenv("run", home / "s.yaml", "--output", home / "in", "--budget", 3, "--json").stdout)
+    summary = json.loads(
+        ddenv("run", home / "s.yaml", "--output", home / "in", "--budget", 3, "--json").stdout
+    )
     assert summary["run_file"] == str(home / "in" / "---esc-1.ddenv")
 
 
 def test_a_malformed_world_is_told_with_its_line(home, command):
     data = yaml.safe_load((DATA / "wall.yaml").read_text())
-    (home / "w.sdf").write_text("<sdf version='1.9'>\n<world name='w'>\n<model name='m'>\n</world></sdf>")
+    (home / "w.sdf").write_text(
+        "<sdf version='1.9'>\n<world name='w'>\n<model name='m'>\n</world></sdf>"
+    )
     data["world"] = "w.sdf"
     data["robot"]["model"] = str(DATA.parents[1] / "sdf" / "robots" / "husky.sdf")
     (home / "s.yaml").write_text(yaml.safe_dump(data))
-    is_one_line(command("run", home / "s.yaml"), "w.sdf:4:1: not well-formed XML: </world> closes <model> of line 3")
+    is_one_line(
+        command("run", home / "s.yaml"),
+        "w.sdf:4:1: not well-formed XML: </world> closes <model> of line 3",
+    )
 
 
 def test_a_newer_run_file_is_refused(reduced, tmp_path, command):
@@ -318,7 +391,8 @@ def test_a_newer_run_file_is_refused(reduced, tmp_path, command):
 
 
 @pytest.mark.parametrize(
-    ("number", "words"), [(1, "1 part of w.sdf was replaced"), (2, "2 parts of w.sdf were replaced")]
+    ("number", "words"),
+    [(1, "1 part of w.sdf was replaced"), (2, "2 parts of w.sdf were replaced")],
 )
 def test_what_was_not_taken_as_it_is_written_is_counted(number, words, capsys):
     announce_notes(SimpleNamespace(notes=[None] * number, path="w.sdf"), as_json=False)
@@ -329,7 +403,8 @@ def test_what_was_not_taken_as_it_is_written_is_counted(number, words, capsys):
 def test_a_file_or_a_run_alone_opens_the_workbench_on_it(home, monkeypatch, first, command):
     opened = []
     monkeypatch.setattr(
-        "ddenv.workbench.launch.run_workbench", lambda *run, **options: opened.append((run, options)) or 0
+        "ddenv.workbench.launch.run_workbench",
+        lambda *run, **options: opened.append((run, options)) or 0,
     )
     (home / "runs").mkdir()
     (home / "runs" / "mine.ddenv").touch()
@@ -341,8 +416,13 @@ def test_a_file_or_a_run_alone_opens_the_workbench_on_it(home, monkeypatch, firs
 
 def test_options_for_reading_stand_before_the_file_or_after_it(home, monkeypatch, command):
     opened, fetched = [], []
-    monkeypatch.setattr("ddenv.workbench.launch.run_workbench", lambda *_, reading, **__: opened.append(reading) or 0)
-    monkeypatch.setattr("ddenv.cli.fetch.fetch_with_bar", lambda world, reading, _: fetched.append((world, reading)))
+    monkeypatch.setattr(
+        "ddenv.workbench.launch.run_workbench",
+        lambda *_, reading, **__: opened.append(reading) or 0,
+    )
+    monkeypatch.setattr(
+        "ddenv.cli.fetch.fetch_with_bar", lambda world, reading, _: fetched.append((world, reading))
+    )
     world = DATA / "wall.sdf"
     before = ["--fetch", "--inside", "--mesh", "hull", "--stand-in", "a=none", "--model-path", home]
     assert command(*before, world, "--stand-in", "b=auto", "--ignore", "joint").returncode == 0
@@ -368,7 +448,9 @@ class Unread(io.StringIO):
         raise BrokenPipeError
 
 
-def test_where_nobody_reads_any_more_it_says_that_the_engine_goes_on_and_how_to_stop_it(run, monkeypatch, capsys):
+def test_where_nobody_reads_any_more_it_says_that_the_engine_goes_on_and_how_to_stop_it(
+    run, monkeypatch, capsys
+):
     fake_moments.mid_round(run).hold()
     monkeypatch.setattr(sys, "stdout", Unread())
     engine = SimpleNamespace(pid=77, poll=lambda: run.write("paused"))
@@ -382,7 +464,14 @@ def test_where_nobody_reads_any_more_it_says_that_the_engine_goes_on_and_how_to_
 
 
 @pytest.mark.parametrize(
-    "words", [["no-such-run"], [], ["--most", "none"], ["--no-such-option"], ["run", "--folder", "/nowhere"]]
+    "words",
+    [
+        ["no-such-run"],
+        [],
+        ["--most", "none"],
+        ["--no-such-option"],
+        ["run", "--folder", "/nowhere"],
+    ],
 )
 def test_whatever_is_wrong_it_says_that_it_cannot_say(home, words, command):
     said = command("reproduce", *words)
@@ -390,7 +479,9 @@ def test_whatever_is_wrong_it_says_that_it_cannot_say(home, words, command):
     assert said.stderr and "Traceback" not in said.stderr
 
 
-@pytest.mark.parametrize("error", [RuntimeError("no simulator"), PermissionError(13, "denied", "file")])
+@pytest.mark.parametrize(
+    "error", [RuntimeError("no simulator"), PermissionError(13, "denied", "file")]
+)
 def test_a_crash_is_no_failure_of_the_robot(monkeypatch, home, error, command):
     def crash(*_):
         raise error
@@ -411,4 +502,7 @@ def test_too_little_memory_is_one_line(error, monkeypatch, capsys):
     with pytest.raises(SystemExit) as ended:
         command_line.main()
     assert ended.value.code == 2
-    assert capsys.readouterr().err == "ddenv: out of memory; 'ulimit -v' says how much a process may use\n"
+    assert (
+        capsys.readouterr().err
+        == "ddenv: out of memory; 'ulimit -v' says how much a process may use\n"
+    )

@@ -18,13 +18,18 @@ def completes(home, tmp_path, monkeypatch):
 
     def of(*words):
         *before, begun = words
-        return [(each.type, each.value) for each in BashComplete(app, {}, "ddenv", "_").get_completions(before, begun)]
+        return [
+            (each.type, each.value)
+            for each in BashComplete(app, {}, "ddenv", "_").get_completions(before, begun)
+        ]
 
     return of
 
 
 def test_after_the_program_commands_runs_scenarios_and_files(completes):
-    assert completes("fr") == [("plain", name) for name in ("frame.world", "friction", "friction-1")]
+    assert completes("fr") == [
+        ("plain", name) for name in ("frame.world", "friction", "friction-1")
+    ]
     assert completes("/etc/pass") == [("file", "/etc/pass")]
     assert ("plain", "export") in completes("ex") and ("file", "ex") not in completes("ex")
     assert ("plain", "--version") in completes("--v")

@@ -99,13 +99,19 @@ def fuel(certificate, monkeypatch, tmp_path):
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.load_cert_chain(certificate)
     # Each connection shakes hands in its own thread.
-    server.socket = context.wrap_socket(server.socket, server_side=True, do_handshake_on_connect=False)
+    server.socket = context.wrap_socket(
+        server.socket, server_side=True, do_handshake_on_connect=False
+    )
     # A client that hangs up is what some tests are about.
     server.handle_error = lambda *_: None
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
     thread.start()
     here = [(socket.AF_INET, socket.SOCK_STREAM, 6, "", server.server_address)]
-    monkeypatch.setattr(socket, "getaddrinfo", lambda host, port, *_: here if (host, port) == (HOSTS[0], 443) else [])
+    monkeypatch.setattr(
+        socket,
+        "getaddrinfo",
+        lambda host, port, *_: here if (host, port) == (HOSTS[0], 443) else [],
+    )
     monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
     for variable in (*VARIABLES, *CACHES, "https_proxy", "HTTPS_PROXY", "all_proxy", "ALL_PROXY"):
         monkeypatch.delenv(variable, raising=False)
@@ -123,9 +129,13 @@ def check(fuel, tmp_path, monkeypatch, capsys):
 
     def run(*uris, fetch=True):
         file = tmp_path / "w.sdf"
-        models = "".join(f"<include><uri>{uri}</uri><name>m{at}</name></include>" for at, uri in enumerate(uris))
+        models = "".join(
+            f"<include><uri>{uri}</uri><name>m{at}</name></include>" for at, uri in enumerate(uris)
+        )
         file.write_text(f"<sdf version='1.6'><world name='w'>{models}</world></sdf>")
-        return in_process(monkeypatch, capsys, "world", "check", file, "--json", *(["--fetch"] if fetch else []))
+        return in_process(
+            monkeypatch, capsys, "world", "check", file, "--json", *(["--fetch"] if fetch else [])
+        )
 
     return run
 
@@ -154,14 +164,21 @@ def test_models_come_with_those_that_they_name_and_gazebo_finds_them_too(fuel, c
     lamp = f"<include><uri>{FUEL}/Some One/models/Lamp/2</uri></include>"
     hall = f"<sdf version='1.6'><model name='hall'><static>1</static><link name='l'>{SHAPE}</link>{lamp}</model></sdf>"
     body = packed(
-        {"model.config": "<model><sdf version='1.6'>model.sdf</sdf></model>", "model.sdf": hall, "meshes/": ""}
+        {
+            "model.config": "<model><sdf version='1.6'>model.sdf</sdf></model>",
+            "model.sdf": hall,
+            "meshes/": "",
+        }
     )
     fuel.has("Big Hall", body, "7")
     fuel.has("Lamp", packed({"model.sdf": CRATE, "meshes/a.dae": "x"}), "2", asked_as="2")
     uri = f"{FUEL}/Some%20One/models/Big%20Hall"
     refused = check(uri, fetch=False)
     assert refused.returncode == 2 and fuel.asked == []
-    assert f"--fetch downloads this model from Fuel, as does gz fuel download -u {uri}\n" in refused.stderr
+    assert (
+        f"--fetch downloads this model from Fuel, as does gz fuel download -u {uri}\n"
+        in refused.stderr
+    )
     done = check(uri)
     assert done.returncode == 0, done.stderr
     models = cache / HOSTS[0] / "some one" / "models"
@@ -178,12 +195,19 @@ def test_models_that_a_robot_names_come_too(fuel, cache, tmp_path):
     wheel = f"<mesh><uri>{FUEL}/Some%20One/models/Wheel/tip/files/wheel.obj</uri></mesh>"
     robot = tmp_path / "robot.sdf"
     shape = f"<collision name='c'><geometry>{wheel}</geometry></collision>"
-    robot.write_text(f"<sdf version='1.6'><model name='robot'><link name='l'>{shape}</link></model></sdf>")
+    robot.write_text(
+        f"<sdf version='1.6'><model name='robot'><link name='l'>{shape}</link></model></sdf>"
+    )
     world = tmp_path / "w.sdf"
     world.write_text(
         f"<sdf version='1.6'><world name='w'>{CRATE.partition('>')[2].removesuffix('</sdf>')}</world></sdf>"
     )
-    fuel.has("Wheel", packed({"model.sdf": CRATE, "wheel.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3 4\n"}))
+    fuel.has(
+        "Wheel",
+        packed(
+            {"model.sdf": CRATE, "wheel.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3 4\n"}
+        ),
+    )
     scenario = scenario_for_world(world, (0, 9, 1, 0), (9, 9)).model_dump(mode="json")
     scenario["robot"]["model"] = str(robot)
     file = tmp_path / "s.yaml"
@@ -193,7 +217,10 @@ def test_models_that_a_robot_names_come_too(fuel, cache, tmp_path):
         load_parts(scenario_named(str(file), given))
     _, found = load_parts(scenario_named(str(file), given | {"fetch": fetch_with_bar}))
     assert len(found.collisions) > 0
-    assert len(fuel.asked) == 1 and (cache / HOSTS[0] / "some one" / "models" / "wheel" / "1" / "wheel.obj").is_file()
+    assert (
+        len(fuel.asked) == 1
+        and (cache / HOSTS[0] / "some one" / "models" / "wheel" / "1" / "wheel.obj").is_file()
+    )
 
 
 def files_in_both(models: Path, cache: Path) -> list[str]:
@@ -216,24 +243,50 @@ def damaged() -> bytes:
 
 GOOD = packed({"model.sdf": CRATE})
 BAD = {
-    "a page": (b"<html>Sign in</html>", {"Content_Type": "text/html"}, "the server sent text/html, which is no zip"),
+    "a page": (
+        b"<html>Sign in</html>",
+        {"Content_Type": "text/html"},
+        "the server sent text/html, which is no zip",
+    ),
     "an error": (b"", {"code": 503}, "the server answered 503 "),
-    "another version": (GOOD, {"version": "../../x"}, "the server sent version '../../x' in place of the newest one"),
+    "another version": (
+        GOOD,
+        {"version": "../../x"},
+        "the server sent version '../../x' in place of the newest one",
+    ),
     "no version": (GOOD, {"version": ""}, "the server sent version ''"),
     "10 GB": (GOOD, {"Content_Length": "10000000000"}, "is larger than 1000 MB, the maximum"),
     "half of it": (GOOD, {"Content_Length": str(len(GOOD) + 9)}, "the connection broke after"),
     "another file": (packed({"report.pdf": "x"}), {}, "holds neither model.config nor an SDF file"),
-    "a climbing file": (packed({"model.sdf": CRATE, "../../evil.sdf": "x"}), {}, "'../../evil.sdf', which leads out"),
-    "an absolute file": (packed({"model.sdf": CRATE, "/tmp/evil.sdf": "x"}), {}, "'/tmp/evil.sdf', which leads out"),
-    "a link": (packed({"model.sdf": CRATE}, **{"/etc": link()}), {}, "'textures', which leads out of its folder"),
+    "a climbing file": (
+        packed({"model.sdf": CRATE, "../../evil.sdf": "x"}),
+        {},
+        "'../../evil.sdf', which leads out",
+    ),
+    "an absolute file": (
+        packed({"model.sdf": CRATE, "/tmp/evil.sdf": "x"}),
+        {},
+        "'/tmp/evil.sdf', which leads out",
+    ),
+    "a link": (
+        packed({"model.sdf": CRATE}, **{"/etc": link()}),
+        {},
+        "'textures', which leads out of its folder",
+    ),
     "other bytes": (damaged(), {}, "the zip file that the server sent is damaged: "),
-    "plain http": (b"", {"code": 302, "Location": "http://127.0.0.1/x.zip"}, "unknown url type: http"),
+    "plain http": (
+        b"",
+        {"code": 302, "Location": "http://127.0.0.1/x.zip"},
+        "unknown url type: http",
+    ),
     "nothing": (None, {}, "the server sent nothing for 0.2 s"),
 }
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_whatever_else_a_server_sends_leaves_nothing_behind(fuel, check, cache, tmp_path, monkeypatch, name):
+def test_whatever_else_a_server_sends_leaves_nothing_behind(
+    fuel, check, cache, tmp_path, monkeypatch, name
+):
     body, options, reason = BAD[name]
     if body is None:
         monkeypatch.setattr(fuel_download, "TIMEOUT", 0.2)
@@ -244,7 +297,10 @@ def test_whatever_else_a_server_sends_leaves_nothing_behind(fuel, check, cache, 
     assert said.returncode == 2 and said.stdout == ""
     (line,) = said.stderr.splitlines()
     assert f"{FUEL}/Some%20One/models/Crate cannot be fetched: " in line and reason in line
-    assert "leave it out with --stand-in 'https://fuel.gazebosim.org/1.0/Some One/models/Crate=none'" in line
+    assert (
+        "leave it out with --stand-in 'https://fuel.gazebosim.org/1.0/Some One/models/Crate=none'"
+        in line
+    )
     assert files_in(tmp_path) == ["w.sdf"] and list(cache.iterdir()) == []
 
 
@@ -262,12 +318,16 @@ def test_what_unpacks_to_too_much_is_refused(fuel, check, tmp_path, monkeypatch)
     assert files_in(tmp_path) == ["w.sdf"]
 
 
-def test_a_model_that_is_not_there_and_a_server_that_nobody_vouches_for(fuel, check, monkeypatch, tmp_path):
+def test_a_model_that_is_not_there_and_a_server_that_nobody_vouches_for(
+    fuel, check, monkeypatch, tmp_path
+):
     uri = f"{FUEL}/Some One/models/Crate"
     assert "is not in Fuel; leave it out" in check(uri).stderr
     monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "none.pem"))
     said = check(uri)
-    assert said.returncode == 2 and "certificate verify failed" in said.stderr and len(fuel.asked) == 1
+    assert (
+        said.returncode == 2 and "certificate verify failed" in said.stderr and len(fuel.asked) == 1
+    )
 
 
 def test_stopped_with_ctrl_c(fuel, check, cache, monkeypatch):

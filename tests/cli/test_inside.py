@@ -35,20 +35,31 @@ def written(path, shapes, more=""):
 def test_what_a_run_has_left_is_reduced_inside_to_the_part_that_stops_the_robot(tmp_path):
     """A post in the robot's way, in one model with others, which another file holds, beside a crate."""
     others = "".join(box(f"far_{number}", 1 + number, 3) for number in range(4))
-    crate = f"<model name='crate'><static>true</static><link name='l'>{box('c', 2, -3)}</link></model>"
+    crate = (
+        f"<model name='crate'><static>true</static><link name='l'>{box('c', 2, -3)}</link></model>"
+    )
     yard = f"<model name='m'><static>true</static><link name='l'>{box('post', 0, 0) + others}</link></model>"
     (tmp_path / "yard").mkdir()
     (tmp_path / "yard" / "model.sdf").write_text(f"<sdf version='1.6'>{yard}</sdf>")
-    included = "<include><name>yard</name><pose>2 0 0 0 0 0</pose><uri>yard/model.sdf</uri></include>"
+    included = (
+        "<include><name>yard</name><pose>2 0 0 0 0 0</pose><uri>yard/model.sdf</uri></include>"
+    )
     world = tmp_path / "world.sdf"
     world.write_text(f"<sdf version='1.9'><world name='w'>{GROUND}{crate}{included}</world></sdf>")
     assert ddenv("run", world, *PLACES, "--output", tmp_path / "whole.ddenv").returncode == 0
     shutil.rmtree(tmp_path / "yard")
     minimal = tmp_path / "minimal.sdf"
-    done = ddenv("run", tmp_path / "whole.ddenv", "--inside", "--output", tmp_path / "inside.ddenv", "--json")
+    done = ddenv(
+        "run", tmp_path / "whole.ddenv", "--inside", "--output", tmp_path / "inside.ddenv", "--json"
+    )
     assert json.loads(done.stdout)["kept"] == ["yard/post"]
     scenario = tmp_path / "minimal.yaml"
-    assert ddenv("export", tmp_path / "inside.ddenv", "--output", minimal, "--scenario", scenario).returncode == 0
+    assert (
+        ddenv(
+            "export", tmp_path / "inside.ddenv", "--output", minimal, "--scenario", scenario
+        ).returncode
+        == 0
+    )
     assert [len(model.collisions) for model in read_world(minimal).models] == [1, 1]
     runs = ddenv("test", scenario, "--repeat", 2, "--json")
     assert {each["outcome"] for each in json.loads(runs.stdout)["runs"]} == {"failed"}, runs.stdout
@@ -64,7 +75,12 @@ def test_a_world_without_models_that_have_parts_is_refused_in_one_line(tmp_path,
 
 def test_inside_a_run_other_options_are_refused_and_not_ignored(run, command):
     fake_moments.finished(run)
-    for option in (("--seed", "5"), ("--cluster", "tcp://there:8786"), ("--exact",), ("--spawn", "0,0,0.2,0")):
+    for option in (
+        ("--seed", "5"),
+        ("--cluster", "tcp://there:8786"),
+        ("--exact",),
+        ("--spawn", "0,0,0.2,0"),
+    ):
         is_one_line(command("run", run.path, "--inside", *option), "a run keeps its own options")
 
 

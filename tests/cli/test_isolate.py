@@ -18,7 +18,10 @@ def test_what_is_known_is_said_without_a_test(run, started, command):
     assert (found["gone"], found["shown"]) == (["crate_00"], True)
     command("isolate", run.path, "--again", "--jobs", 1)
     command("isolate", run.path, "--runs", 50, "--jobs", 1)
-    assert started == [(run.path, 1, {"isolate": 0, "cluster": None}), (run.path, 1, {"isolate": 50, "cluster": None})]
+    assert started == [
+        (run.path, 1, {"isolate": 0, "cluster": None}),
+        (run.path, 1, {"isolate": 50, "cluster": None}),
+    ]
 
 
 def test_one_that_was_stopped_goes_on(run, started, command):
@@ -26,7 +29,9 @@ def test_one_that_was_stopped_goes_on(run, started, command):
     done = command("isolate", run.path, "--jobs", 1)
     assert started == [(run.path, 1, {"isolate": 0, "cluster": None})]
     # No engine works here.
-    stopped = f"the search for a world that passes was stopped; continue with: ddenv isolate {run.path}"
+    stopped = (
+        f"the search for a world that passes was stopped; continue with: ddenv isolate {run.path}"
+    )
     assert (done.returncode, done.stderr) == (2, f"ddenv: {run.path}: {stopped}\n")
 
 
@@ -81,7 +86,9 @@ def test_the_world_that_passes_is_drawn_and_written(run, tmp_path, command):
     assert [name for name in run.elements if f'"{name}"' not in text] == ["crate_00"]
 
 
-@pytest.mark.parametrize("words", [("world", "show", "RUN", "--passes"), ("export", "RUN", "--sdf", "OUT", "--passes")])
+@pytest.mark.parametrize(
+    "words", [("world", "show", "RUN", "--passes"), ("export", "RUN", "--sdf", "OUT", "--passes")]
+)
 def test_where_no_such_world_is_known_one_line_says_how_to_find_it(run, tmp_path, words, command):
     fake_moments.finished(run)
     there = {"RUN": run.path, "OUT": tmp_path / "passes.sdf"}

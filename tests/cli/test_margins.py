@@ -28,7 +28,18 @@ def test_the_table_and_its_sentences_stand_everywhere(run, started, tmp_path, co
     assert (done.returncode, started) == (0, [(run.path, 1, asked)])
     said = done.stdout.splitlines()
     assert said[0].split() == ["number", "now", "f", "until", "instead", "runs"]
-    assert said[1].split() == ["crate_00.friction", "0.1", "0", "(end)", "…", "0.2", "goal", "at", "0.4", "17"]
+    assert said[1].split() == [
+        "crate_00.friction",
+        "0.1",
+        "0",
+        "(end)",
+        "…",
+        "0.2",
+        "goal",
+        "at",
+        "0.4",
+        "17",
+    ]
     assert f"{FRICTION}." in said
     assert "no f at 0.31 (0 of 7 runs), where the robot was lost in 7" in done.stdout
     assert "1.25 is not possible: crate_01 would be 0.20 m inside crate_00" in done.stdout
@@ -40,7 +51,10 @@ def test_the_table_and_its_sentences_stand_everywhere(run, started, tmp_path, co
     assert (found["fixes"][0]["value"], found["fixes"][0]["confirmed"]) == (0.4, True)
     write_report(run.path, tmp_path / "report.md")
     write_bundle(run.path, tmp_path / "handed")
-    for text in ((tmp_path / "report.md").read_text(), (tmp_path / "handed" / "ISSUE.md").read_text()):
+    for text in (
+        (tmp_path / "report.md").read_text(),
+        (tmp_path / "handed" / "ISSUE.md").read_text(),
+    ):
         assert FRICTION in text.replace("\\", "")
         assert FIX in text.replace("\\", "")
 
@@ -68,8 +82,18 @@ def test_a_value_is_tried_again_in_what_is_left(run, monkeypatch, command):
         "failure": "",
         "distance": None,
     }
-    monkeypatch.setattr("ddenv.engine.single_test.run_trials", lambda *given: asked.append(given) or [made])
-    words = ["--minimal", "--margin", "crate_01.y=1.5", "--margin", "crate_00.friction", "--repeat", 3]
+    monkeypatch.setattr(
+        "ddenv.engine.single_test.run_trials", lambda *given: asked.append(given) or [made]
+    )
+    words = [
+        "--minimal",
+        "--margin",
+        "crate_01.y=1.5",
+        "--margin",
+        "crate_00.friction",
+        "--repeat",
+        3,
+    ]
     assert command("test", run.path, *words).returncode == 0
     ((subject, trials, _),) = asked
     assert subject.world.model("crate_01").pose.position[1] == 1.5
@@ -87,7 +111,12 @@ def test_bars_stand_on_one_scale(run):
     assert {len(line) for line in lines_of} == {41}
     # 0.2 is 11 % of the scale away, 0.4 a third; roots of these are drawn.
     assert lines_of[0].strip() == "██████|██████+++++"
-    assert lines_of[1].index("·") < lines_of[1].index("|") < lines_of[1].index("█") < lines_of[1].index("x")
+    assert (
+        lines_of[1].index("·")
+        < lines_of[1].index("|")
+        < lines_of[1].index("█")
+        < lines_of[1].index("x")
+    )
 
 
 def test_what_cannot_be_is_refused_in_one_line(run, started, command):
@@ -119,15 +148,38 @@ def test_the_fix_is_written_as_a_world_that_differs_by_one_number(run, tmp_path,
     assert done.returncode == 0, done.stderr
     pairs = list(zip(left.read_text().splitlines(), fixed.read_text().splitlines(), strict=True))
     ((before, after),) = [pair for pair in pairs if pair[0] != pair[1]]
-    differ = [words for words in zip(before.split(), after.split(), strict=True) if words[0] != words[1]]
+    differ = [
+        words for words in zip(before.split(), after.split(), strict=True) if words[0] != words[1]
+    ]
     assert [words[1] for words in differ] == ["1.5"]
 
 
 def test_who_is_interrupted_reads_how_to_go_on(run, monkeypatch, command):
     fake_moments.finished(run)
-    numbers = ({"name": "crate_00.y", "now": 0.0, "low": -3.0, "high": 3.0, "scale": 3.0, "resolution": 0.01},)
-    began = {"environment": run.state.nodes[run.state.node].id, "rate": 0.9, "error": 0.01, "budget": 50}
-    run.write("margins_started", numbers=numbers, certified=True, status="finished", before="done", **began)
+    numbers = (
+        {
+            "name": "crate_00.y",
+            "now": 0.0,
+            "low": -3.0,
+            "high": 3.0,
+            "scale": 3.0,
+            "resolution": 0.01,
+        },
+    )
+    began = {
+        "environment": run.state.nodes[run.state.node].id,
+        "rate": 0.9,
+        "error": 0.01,
+        "budget": 50,
+    }
+    run.write(
+        "margins_started",
+        numbers=numbers,
+        certified=True,
+        status="finished",
+        before="done",
+        **began,
+    )
     state = run.state
 
     def interrupted(*_):

@@ -44,7 +44,9 @@ def test_those_of_other_packages_are_listed_and_cannot_steer_the_terminal(tmp_pa
     monkeypatch.syspath_prepend(tmp_path)
     entry = EntryPoint("halves", "theirs:halves", "ddenv.partitionings")
     gone = EntryPoint("gone", "nowhere.at_all:gone", "ddenv.partitionings")
-    monkeypatch.setattr(schemas, "_installed", lambda: defaultdict(list, {"partitioning": [entry, gone]}))
+    monkeypatch.setattr(
+        schemas, "_installed", lambda: defaultdict(list, {"partitioning": [entry, gone]})
+    )
     schemas._known.cache_clear()
     schemas.explanation.cache_clear()
     told = "\n".join(lines())
@@ -60,7 +62,9 @@ def test_the_command_prints_them_without_what_is_slow(words):
         f"app(['schemas', *{words}], standalone_mode=False)\n"
         "print([name for name in ('sklearn', 'numpy', 'pydrake', 'scipy') if name in sys.modules], file=sys.stderr)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE
+    )
     assert done.stderr.strip() == "[]"
     if words:
         assert json.loads(done.stdout) == report()

@@ -11,7 +11,10 @@ from ddenv.world.sdf.read import read_world
 from tests.map.worlds import GROUND, box, world_of
 
 ESCAPE = re.compile("\x1b\\[[0-9;]*m")
-CRATES = [GROUND, *(box(f"crate {number}", 3 * number, 0.5 * number, size=(1.5, 1.5, 1)) for number in range(6))]
+CRATES = [
+    GROUND,
+    *(box(f"crate {number}", 3 * number, 0.5 * number, size=(1.5, 1.5, 1)) for number in range(6)),
+]
 NASTY = "\x7f[bold]<b>\u202e\"'"
 
 
@@ -28,17 +31,27 @@ def picture(lines: list[str]) -> list[str]:
 @pytest.mark.parametrize("size", [(120, 36), (80, 24), (40, 12), (200, 60), (5, 3)])
 @pytest.mark.parametrize("count", [0, 1, 6, 300])
 def test_a_map_fits_the_terminal(size, count, color):
-    models = [box(f"model with a long name {number}", number % 20, number // 20) for number in range(count)]
-    lines = plain(terminal_map(world_of(GROUND, *models), *size, color=color, spawn=(0, 0, 0), goal=(5, 5)))
+    models = [
+        box(f"model with a long name {number}", number % 20, number // 20)
+        for number in range(count)
+    ]
+    lines = plain(
+        terminal_map(world_of(GROUND, *models), *size, color=color, spawn=(0, 0, 0), goal=(5, 5))
+    )
     assert len(lines) <= max(size[1], 12)
     assert max(map(width, lines)) <= max(size[0], 40)
 
 
 def test_the_ditch_is_seen_and_explained():
     world = read_world(SDF / "worlds" / "ditch.sdf")
-    lines = terminal_map(world, 120, 36, color=False, spawn=(-6.5, 0, 0), goal=(6.5, 0)).splitlines()
+    lines = terminal_map(
+        world, 120, 36, color=False, spawn=(-6.5, 0, 0), goal=(6.5, 0)
+    ).splitlines()
     assert lines[0] == "ditch.sdf · 43 models · S start (-6.5, 0), yaw 0 · G goal (6.5, 0)"
-    assert any(re.search(r"^A  asphalt_\w+ +-?4\.2[01], 0\.00  8\.00 x 9\.00 x 2\.00", line) for line in lines)
+    assert any(
+        re.search(r"^A  asphalt_\w+ +-?4\.2[01], 0\.00  8\.00 x 9\.00 x 2\.00", line)
+        for line in lines
+    )
     assert re.search(r"\.\.\. and \d+ more \(--svg FILE names them\)", "\n".join(lines))
     drawn = "".join(picture(lines))
     assert "S→" in drawn
@@ -52,7 +65,9 @@ def test_without_colours_models_are_areas_of_their_letters():
     lines = text.splitlines()
     drawn = "".join(picture(lines))
     for number in range(6):
-        (sign,) = {match[1] for line in lines if (match := re.search(rf"(\S)  crate {number} ", line))}
+        (sign,) = {
+            match[1] for line in lines if (match := re.search(rf"(\S)  crate {number} ", line))
+        }
         assert drawn.count(sign) >= 4
 
 
@@ -63,7 +78,9 @@ def test_with_colours_models_have_those_of_the_file():
 
 
 def test_numbers_along_the_axes_are_where_they_belong():
-    lines = terminal_map(world_of(box("a", 0, 0), box("b", 10, 4)), 80, 24, color=False).splitlines()
+    lines = terminal_map(
+        world_of(box("a", 0, 0), box("b", 10, 4)), 80, 24, color=False
+    ).splitlines()
     frame = next(line for line in lines if "└" in line)
     numbers = lines[lines.index(frame) + 1]
     ticks = [match.start() for match in re.finditer("┬", frame)]

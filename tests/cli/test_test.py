@@ -18,7 +18,13 @@ def runs(without, *outcomes):
 
 
 def test_each_environment_has_its_runs_its_rate_and_its_interval():
-    found = summary([*runs(None, *["similar"] * 4), *runs("ball", "pass", "other", "error"), *runs("wall", "timeout")])
+    found = summary(
+        [
+            *runs(None, *["similar"] * 4),
+            *runs("ball", "pass", "other", "error"),
+            *runs("wall", "timeout"),
+        ]
+    )
     assert [(row["without"], row["runs"], row["shown"], row["rate"]) for row in found] == [
         (None, 4, 4, 1.0),
         ("ball", 2, 0, 0.0),
@@ -33,7 +39,9 @@ def test_each_environment_has_its_runs_its_rate_and_its_interval():
 
 
 def test_where_no_f_is_known_all_failures_count():
-    assert lines(summary(runs(None, "failed", "pass", "pass"))) == ["all 3 models: 1 of 3 runs failed (6 % to 79 %)"]
+    assert lines(summary(runs(None, "failed", "pass", "pass"))) == [
+        "all 3 models: 1 of 3 runs failed (6 % to 79 %)"
+    ]
 
 
 def test_runs_in_another_simulator_are_compared_with_the_certificate():
@@ -76,7 +84,9 @@ def test_where_every_run_breaks_the_command_says_so_by_its_exit_code(monkeypatch
 def test_the_command_ends_with_it(monkeypatch, command):
     results = [*runs(None, "failed", "failed"), *runs("w\x1b", "pass", "pass")]
     more = {"seed": 1, "end_pose": None, "failure": "", "distance": None}
-    monkeypatch.setattr("ddenv.engine.single_test.run_trials", lambda *_: iter([one | more for one in results]))
+    monkeypatch.setattr(
+        "ddenv.engine.single_test.run_trials", lambda *_: iter([one | more for one in results])
+    )
     said = command("test", DATA / "wall.yaml", "--repeat", 2).stdout
     assert said.splitlines()[-3:] == [
         "",

@@ -24,7 +24,9 @@ LOOKS = {
 
 
 def without(home, modules, words):
-    (home / "sitecustomize.py").write_text(f"import sys\n\nsys.modules.update(dict.fromkeys({modules!r}))\n")
+    (home / "sitecustomize.py").write_text(
+        f"import sys\n\nsys.modules.update(dict.fromkeys({modules!r}))\n"
+    )
     path = os.pathsep.join([str(home), os.environ.get("PYTHONPATH", "")])
     return ddenv(*words, cwd=home, env=os.environ | {"PYTHONPATH": path, "DDENV_HOME": str(home)})
 

@@ -31,13 +31,20 @@ def world(tmp_path):
 def test_the_table_has_a_line_for_each_model_and_its_notes_by_number(world):
     told = lines(world)
     (row,) = (line for line in told if line.startswith("crate  "))
-    assert "dynamic" in row and "1 box" in row and "1.00 x 2.00 x 4.00" in row and "4.00, 2.00, 3.00" in row
+    assert (
+        "dynamic" in row
+        and "1 box" in row
+        and "1.00 x 2.00 x 4.00" in row
+        and "4.00, 2.00, 3.00" in row
+    )
     notes = [line.split("  ", 1)[1].strip() for line in told[told.index("notes") + 1 : -3]]
     moved = next(number for number, note in enumerate(notes, 1) if "<state>" in note)
     assert f"{moved} (3.00 m)" in row
     assert any(line.startswith("crate #2") and "none" in line for line in told)
     assert told[-2] == "3 models, 2 can be removed; 4 replaced, 1 ignored"
-    assert told[-1].startswith("the official checker (ign sdf -k) refuses a <world> with two parts of the same name: ")
+    assert told[-1].startswith(
+        "the official checker (ign sdf -k) refuses a <world> with two parts of the same name: "
+    )
 
 
 def box(name, pose="0 0 0 0 0 0", relative=""):
@@ -65,9 +72,15 @@ def test_models_that_must_stay_are_named(tmp_path):
 
 
 STATE = "".join(
-    f"<model name='crate {name}'><pose>{number} 9 3 0 0 0</pose></model>" for number, name in enumerate("ab")
+    f"<model name='crate {name}'><pose>{number} 9 3 0 0 0</pose></model>"
+    for number, name in enumerate("ab")
 )
-CROWD = (box("crate a"), box("crate b"), box("a model whose name is far longer than all of the others"), box("箱" * 12))
+CROWD = (
+    box("crate a"),
+    box("crate b"),
+    box("a model whose name is far longer than all of the others"),
+    box("箱" * 12),
+)
 
 
 @pytest.fixture
@@ -84,7 +97,9 @@ def test_at_80_columns_each_model_of_the_ditch_has_one_line():
     told = lines(ditch, 80)
     rows = told[told.index("") + 1 :]
     assert "centre x, y, z, m" in rows[0] and "links" not in rows[0]
-    assert [row.split()[0] for row in rows[1 : rows.index("")]] == [model.name for model in ditch.models]
+    assert [row.split()[0] for row in rows[1 : rows.index("")]] == [
+        model.name for model in ditch.models
+    ]
 
 
 @pytest.mark.parametrize("columns", [20, 40, 62, 80, 120])
@@ -129,14 +144,26 @@ def test_the_commands(tmp_path, command):
     wall = DATA / "wall.sdf"
     table = ddenv("world", "check", wall)
     assert table.returncode == 0
-    unseen = "models without a visual, which can be hit but not seen: far_box, post, ball and 1 more"
-    assert table.stdout.endswith(f"\n7 models, 6 can be removed; nothing was replaced or ignored\n{unseen}\n")
+    unseen = (
+        "models without a visual, which can be hit but not seen: far_box, post, ball and 1 more"
+    )
+    assert table.stdout.endswith(
+        f"\n7 models, 6 can be removed; nothing was replaced or ignored\n{unseen}\n"
+    )
     assert len(json.loads(command("world", "check", wall, "--json").stdout)["models"]) == 7
     drawn = command("world", "show", wall)
     assert drawn.returncode == 0 and "wall" in drawn.stdout and "\x1b" not in drawn.stdout
-    assert command("world", "show", wall, "--svg", tmp_path / "map.svg").stdout == f"wrote {tmp_path / 'map.svg'}\n"
-    assert (tmp_path / "map.svg").read_text().startswith("<svg") or "<svg" in (tmp_path / "map.svg").read_text()[:200]
-    assert command("world", "convert", wall, "-o", tmp_path / "out.sdf").stdout == f"wrote {tmp_path / 'out.sdf'}\n"
+    assert (
+        command("world", "show", wall, "--svg", tmp_path / "map.svg").stdout
+        == f"wrote {tmp_path / 'map.svg'}\n"
+    )
+    assert (tmp_path / "map.svg").read_text().startswith("<svg") or "<svg" in (
+        tmp_path / "map.svg"
+    ).read_text()[:200]
+    assert (
+        command("world", "convert", wall, "-o", tmp_path / "out.sdf").stdout
+        == f"wrote {tmp_path / 'out.sdf'}\n"
+    )
 
 
 def test_a_scenario_stands_for_its_world(command):
@@ -155,7 +182,9 @@ def test_a_settled_world_is_written_with_nothing_else_changed(tmp_path, command)
     ground = WORLD[WORLD.index(b"<model name='ground'") : WORLD.index(b"<model name='crate'")]
     crates = CRATE.format(name="falls", y=1) + CRATE.format(name="leans", y=1.2)
     path, out = tmp_path / "hall.world", tmp_path / "settled.world"
-    path.write_bytes(b"<sdf version='1.6'><world name='hall'>\n" + ground + crates.encode() + b"</world></sdf>")
+    path.write_bytes(
+        b"<sdf version='1.6'><world name='hall'>\n" + ground + crates.encode() + b"</world></sdf>"
+    )
     said = command("world", "settle", path, "-o", out)
     assert said.returncode == 0, said.stderr
     assert f"wrote {out}: 2 models moved within " in said.stdout
@@ -171,7 +200,9 @@ def test_a_settled_world_is_written_with_nothing_else_changed(tmp_path, command)
     assert refused.returncode == 2 and "is the world itself; choose another file" in refused.stderr
 
 
-def test_it_is_said_where_each_file_was_found_and_how_to_get_those_that_were_not(tmp_path, monkeypatch):
+def test_it_is_said_where_each_file_was_found_and_how_to_get_those_that_were_not(
+    tmp_path, monkeypatch
+):
     def include(uri):
         return f"<include><uri>{uri}</uri></include>"
 
@@ -188,7 +219,10 @@ def test_it_is_said_where_each_file_was_found_and_how_to_get_those_that_were_not
     told = lines(world)
     assert f"   1 in models beside worlds, {tmp_path / 'models'}: model://crate" in told
     assert f"   1 in GZ_SIM_RESOURCE_PATH, {tmp_path / 'gz'}: model://barrel" in told
-    assert f"--fetch downloads this model from Fuel, as does gz fuel download -u {tree}/2" in "\n".join(told)
+    assert (
+        f"--fetch downloads this model from Fuel, as does gz fuel download -u {tree}/2"
+        in "\n".join(told)
+    )
     assert report(world)["files"][1] == {
         "uri": "model://barrel",
         "path": str(tmp_path / "gz" / "barrel" / "model.sdf"),
@@ -236,7 +270,10 @@ def test_a_model_is_included_as_the_refusal_says(tmp_path):
 
 def test_notes_of_one_kind_are_one_line_with_their_number(tmp_path):
     missing = "<visual name='v'><geometry><mesh><uri>model://{}</uri></mesh></geometry></visual>"
-    visuals = [missing.format(name).replace("'v'", f"'v{at}'") for at, name in enumerate(["a", "b", "c", "a"])]
+    visuals = [
+        missing.format(name).replace("'v'", f"'v{at}'")
+        for at, name in enumerate(["a", "b", "c", "a"])
+    ]
     model = f"<model name='m'><static>1</static><link name='l'>{''.join(visuals)}</link></model>"
     told = lines(world_of(tmp_path, model, more="<plugin name='p' filename='f'/>"))
     (drawn,) = (line for line in told if "is not drawn" in line)

@@ -55,8 +55,18 @@ def test_another_simulator_is_told_from_the_one_of_the_run(reduced, tmp_path):
     said = {}
     for name in ("drive.py", "open.py"):
         (tmp_path / name).chmod(0o755)
-        (tmp_path / "simulator.yaml").write_text(f"name: {name}\ncommand: ./{name} {{world}} {{seed}}\n")
-        words = ["--minimal", "--leave-each-out", "--repeat", 8, "--json", "--simulator", "simulator.yaml"]
+        (tmp_path / "simulator.yaml").write_text(
+            f"name: {name}\ncommand: ./{name} {{world}} {{seed}}\n"
+        )
+        words = [
+            "--minimal",
+            "--leave-each-out",
+            "--repeat",
+            8,
+            "--json",
+            "--simulator",
+            "simulator.yaml",
+        ]
         found = json.loads(ddenv("test", reduced[0], *words, cwd=tmp_path).stdout)["elsewhere"]
         said[name] = [(each["without"], each["fails"]) for each in found]
     assert said["drive.py"] == [(None, True), ("shelf_left", False), ("shelf_right", False)]
@@ -66,7 +76,10 @@ def test_another_simulator_is_told_from_the_one_of_the_run(reduced, tmp_path):
 @pytest.mark.examples
 def test_a_test_for_pytest_fails_as_long_as_the_robot_fails(reduced, tmp_path):
     done = ddenv("export", reduced[0], "--pytest", tmp_path, cwd=tmp_path)
-    assert done.stdout.splitlines() == [f"wrote {tmp_path / 'test_run.py'}", f"wrote {tmp_path / 'run.ddenv'}"]
+    assert done.stdout.splitlines() == [
+        f"wrote {tmp_path / 'test_run.py'}",
+        f"wrote {tmp_path / 'run.ddenv'}",
+    ]
     test = tmp_path / "test_run.py"
     pytest_ = [
         sys.executable,
@@ -98,7 +111,9 @@ def test_the_class_of_the_page_runs_as_the_command_does():
     (shown,) = re.findall(r"```python\n(class .*?)```", PAGE, re.DOTALL)
     assert SCENARIO.with_name("corner.py").read_text().endswith(shown)
     scenario = load_scenario(SCENARIO)
-    in_python = scenario.model_copy(update={"oracle": Oracle(**yaml.safe_load(BLOCKS[1])["oracle"])})
+    in_python = scenario.model_copy(
+        update={"oracle": Oracle(**yaml.safe_load(BLOCKS[1])["oracle"])}
+    )
     world, _ = load_parts(scenario)
     one, other = ExternalSimulator(world, scenario), PythonSimulator(world, in_python)
     try:
@@ -118,7 +133,9 @@ def test_what_the_class_says_took_part_is_used_and_a_lie_is_found(tmp_path):
     for name, took_part in (("true", "touched"), ("lie", 'touched - {"shelf_right"}')):
         folder = tmp_path / name
         shutil.copytree(SCENARIO.parent, folder)
-        (folder / "corner.py").write_text(code.replace("took_part=touched", f"took_part={took_part}"))
+        (folder / "corner.py").write_text(
+            code.replace("took_part=touched", f"took_part={took_part}")
+        )
         text = SCENARIO.read_text().replace(*(block.strip() for block in BLOCKS[:2]))
         (folder / "scenario.yaml").write_text(text)
         done = ddenv("run", "scenario.yaml", "--output", "run.ddenv", cwd=folder)

@@ -22,7 +22,9 @@ def test_the_readme_has_the_test_command_in_one_line():
 
 
 def test_the_headline_figures_are_those_of_the_study():
-    assert marked(README.read_text(encoding="utf-8"), "headline") == headline(marked(STUDY.read_text(), "nine"))
+    assert marked(README.read_text(encoding="utf-8"), "headline") == headline(
+        marked(STUDY.read_text(), "nine")
+    )
 
 
 def test_the_headline_has_no_numbers_of_what_is_not_certified():
@@ -48,12 +50,18 @@ HOUSE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
 
 
 def test_the_drawing_of_the_house_has_every_room():
-    rooms = {path.stem for path in (ROOT / "src/ddenv").iterdir() if not path.stem.startswith("_") and path.is_dir()}
+    rooms = {
+        path.stem
+        for path in (ROOT / "src/ddenv").iterdir()
+        if not path.stem.startswith("_") and path.is_dir()
+    }
     drawing = HOUSE.split("```")[1]
     assert rooms - set(re.findall(r"\w+", drawing)) == set()
 
 
-WALKS = dict(re.findall(r"^### (The life of .*?)$(.*?)(?=^###? |\Z)", HOUSE, re.MULTILINE | re.DOTALL))
+WALKS = dict(
+    re.findall(r"^### (The life of .*?)$(.*?)(?=^###? |\Z)", HOUSE, re.MULTILINE | re.DOTALL)
+)
 
 
 @pytest.mark.parametrize("walk", WALKS)
@@ -76,7 +84,9 @@ def said() -> str:
     for file in (ROOT / "src").rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.JoinedStr):
-                parts = (part.value if isinstance(part, ast.Constant) else "\0" for part in node.values)
+                parts = (
+                    part.value if isinstance(part, ast.Constant) else "\0" for part in node.values
+                )
                 found.append("".join(parts))
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
                 found.append(node.value)

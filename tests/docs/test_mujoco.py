@@ -37,7 +37,9 @@ from tests.robot.drake.conftest import EDGE, ROAD, piece
 from tests.robot.drake.test_floors import platform
 
 FOLDER = ROOT / "docs/examples/mujoco"
-needs_mujoco = pytest.mark.skipif(find_spec("mujoco") is None, reason="mujoco is not installed: pip install mujoco")
+needs_mujoco = pytest.mark.skipif(
+    find_spec("mujoco") is None, reason="mujoco is not installed: pip install mujoco"
+)
 ROBOT = read_model(SDF / "robots" / "husky.sdf")
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
 SHAPES = [
@@ -61,22 +63,44 @@ def mjcf(monkeypatch):
 
 
 def link(name, *shapes, at=0.0, mass=None):
-    collisions = tuple(Collision(name=f"c{number}", shape=shape, pose=Pose(), mu=mu) for number, (shape, mu) in enumerate(shapes))
+    collisions = tuple(
+        Collision(name=f"c{number}", shape=shape, pose=Pose(), mu=mu)
+        for number, (shape, mu) in enumerate(shapes)
+    )
     inertia = None if mass is None else Inertia(mass, Pose(), (1.0, 1.0, 1.0))
-    return Link(name=name, pose=Pose((at, 0.0, 0.0)), inertia=inertia, collisions=collisions, visuals=())
+    return Link(
+        name=name, pose=Pose((at, 0.0, 0.0)), inertia=inertia, collisions=collisions, visuals=()
+    )
 
 
 def model(name, *links, static=False, joints=()):
-    return Model(name=name, pose=Pose(), static=static, links=links, joints=joints, spans=(), line=1)
+    return Model(
+        name=name, pose=Pose(), static=static, links=links, joints=joints, spans=(), line=1
+    )
 
 
 def joint(kind, parent, child, **more):
-    return Joint(name=f"{parent}-{child}", kind=kind, parent=parent, child=child, pose=Pose((1, 0, 0)), axis=(0, 0, 1), lower=-1, upper=1, effort=9, velocity=9, damping=0.5, **more)
+    return Joint(
+        name=f"{parent}-{child}",
+        kind=kind,
+        parent=parent,
+        child=child,
+        pose=Pose((1, 0, 0)),
+        axis=(0, 0, 1),
+        lower=-1,
+        upper=1,
+        effort=9,
+        velocity=9,
+        damping=0.5,
+        **more,
+    )
 
 
 def written(mjcf, *models):
     world = World(path=ROOT, name="w", text=b"", gravity=(0.0, 0.0, -9.8), models=models)
-    return ElementTree.fromstring(mjcf.mjcf(world, ROBOT, Pose((0, 0, 1)), find_drive(ROBOT), 30.0, 0.002))
+    return ElementTree.fromstring(
+        mjcf.mjcf(world, ROBOT, Pose((0, 0, 1)), find_drive(ROBOT), 30.0, 0.002)
+    )
 
 
 def test_every_shape_has_its_like_and_the_smoother_surface_decides(mjcf):
@@ -94,12 +118,20 @@ def test_every_shape_has_its_like_and_the_smoother_surface_decides(mjcf):
     ]
     assert geoms[0].get("size") == "0.5 1 1.5"
     assert len(tree.find("asset/mesh").get("vertex").split()) == 24
-    priority = {float(geom.get("friction").split()[0]): int(geom.get("priority")) for geom in tree.iter("geom")}
+    priority = {
+        float(geom.get("friction").split()[0]): int(geom.get("priority"))
+        for geom in tree.iter("geom")
+    }
     assert sorted(priority, key=priority.get, reverse=True) == sorted(priority)
 
 
 def test_links_hang_on_their_joints_and_wheels_have_motors(mjcf):
-    parts = [link("base", mass=1), link("door", at=2.0, mass=1), link("loose", mass=1), link("post")]
+    parts = [
+        link("base", mass=1),
+        link("door", at=2.0, mass=1),
+        link("loose", mass=1),
+        link("post"),
+    ]
     joints = (joint("revolute", "base", "door"), joint("fixed", "world", "post"))
     tree = written(mjcf, model("m", *parts, joints=joints))
     door = tree.find("worldbody/body[@name='1 base']/body[@name='1 door']")
@@ -108,12 +140,21 @@ def test_links_hang_on_their_joints_and_wheels_have_motors(mjcf):
         "-1 0 0",
         "-1 1",
     )
-    assert [body.get("name") for body in tree.findall("worldbody/body") if body.find("freejoint") is not None] == [
+    assert [
+        body.get("name")
+        for body in tree.findall("worldbody/body")
+        if body.find("freejoint") is not None
+    ] == [
         "0 base_link",
         "1 base",
         "1 loose",
     ]
-    assert len([pair for pair in tree.findall("contact/exclude") if pair.get("body1").startswith("1 ")]) == 6
+    assert (
+        len(
+            [pair for pair in tree.findall("contact/exclude") if pair.get("body1").startswith("1 ")]
+        )
+        == 6
+    )
     motors = [motor.get("joint") for motor in tree.findall("actuator/velocity")]
     assert motors == [f"0 {name}" for name in find_drive(ROBOT).joints]
 
@@ -132,7 +173,9 @@ def test_what_it_cannot_translate_is_one_line(mjcf, joints):
 
 
 def test_the_file_of_the_simulator_is_read():
-    assert load_simulator(FOLDER / "simulator.yaml") == Oracle(name="MuJoCo", use="drive:MuJoCo", folder=FOLDER)
+    assert load_simulator(FOLDER / "simulator.yaml") == Oracle(
+        name="MuJoCo", use="drive:MuJoCo", folder=FOLDER
+    )
 
 
 @needs_mujoco
@@ -166,10 +209,15 @@ HEIGHTS = [0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.05, 0.08, 0.1, 0.11, 0.17, 
 @pytest.mark.parametrize("number", range(20))
 def test_on_a_floor_cut_at_random_the_robot_ends_where_it_does_in_mujoco(tmp_path, number):
     chance = random.Random(number)
-    frame = Pose.from_rpy(3.0, -2.0, 0.0, 0.0, chance.choice([0.0, -0.05, 0.05]), chance.uniform(-3.1, 3.1))
+    frame = Pose.from_rpy(
+        3.0, -2.0, 0.0, 0.0, chance.choice([0.0, -0.05, 0.05]), chance.uniform(-3.1, 3.1)
+    )
     cuts, across = ([chance.random() for _ in range(chance.randint(0, 4))] for _ in range(2))
     height = HEIGHTS[number % len(HEIGHTS)]
-    floor = [piece("road", ROAD, frame @ Pose((EDGE - 3.0, 0.0, -0.05))), *platform(height, cuts, across, frame)]
+    floor = [
+        piece("road", ROAD, frame @ Pose((EDGE - 3.0, 0.0, -0.05))),
+        *platform(height, cuts, across, frame),
+    ]
     boxes = "".join(
         f"<model name='{number}'><static>true</static><pose>{numbers(one.pose.position + one.pose.rpy())}</pose>"
         f"<link name='link'><collision name='c'><geometry><box><size>{numbers(one.shape.size)}</size></box></geometry>"
@@ -179,7 +227,11 @@ def test_on_a_floor_cut_at_random_the_robot_ends_where_it_does_in_mujoco(tmp_pat
     (tmp_path / "floor.sdf").write_text(f"<sdf version='1.9'><world name='w'>{boxes}</world></sdf>")
     start, goal = ((frame @ Pose(place)).position for place in ((0.0, 0.0, 0.14), (3.0, 0.0, 0.0)))
     scenario = FLOOR.format(
-        robot=SDF / "robots/husky.sdf", start=start, yaw=frame.yaw(), goal=goal, speed=chance.choice([0.3, 0.5, 0.8])
+        robot=SDF / "robots/husky.sdf",
+        start=start,
+        yaw=frame.yaw(),
+        goal=goal,
+        speed=chance.choice([0.3, 0.5, 0.8]),
     )
     (tmp_path / "floor.yaml").write_text(scenario)
     scenario = load_scenario(tmp_path / "floor.yaml")

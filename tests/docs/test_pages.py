@@ -63,11 +63,22 @@ def test_the_reference_names_every_key(section):
     ("key", "section"),
     [
         *((f"failure.{key}", FailureSpec) for key in ("epsilon", "timeout")),
-        *((f"reduction.{key}", Reduction) for key in ("n_partitions", "iterations", "delta", "seed", "baseline_runs")),
+        *(
+            (f"reduction.{key}", Reduction)
+            for key in ("n_partitions", "iterations", "delta", "seed", "baseline_runs")
+        ),
         ("simulation.time_step", Simulation),
         *(
             (key, Planner)
-            for key in ("padding", "inflation", "look_ahead", "replan", "patience", "recoveries", "lowest")
+            for key in (
+                "padding",
+                "inflation",
+                "look_ahead",
+                "replan",
+                "patience",
+                "recoveries",
+                "lowest",
+            )
         ),
         *((key, Sensors) for key in ("compass", "gyro", "tilt", "odometry", "compass_rate")),
         *((key, Controller) for key in ("period", "speed", "heading_gain", "skid", "motor_gain")),
@@ -83,7 +94,9 @@ def test_the_reference_has_the_defaults(key: str, section: type[Section]):
 @pytest.mark.parametrize("command", ["run", "test", "study"])
 def test_the_reference_names_every_option(command):
     parameters = app.get_command(Context(app), command).params
-    options = {option for parameter in parameters for option in parameter.opts if option.startswith("--")}
+    options = {
+        option for parameter in parameters for option in parameter.opts if option.startswith("--")
+    }
     assert {option for option in options if f"`{option}" not in REFERENCE} == set()
 
 
@@ -106,9 +119,15 @@ COMMANDS = sorted({line for page in PAGES for line in COMMAND.findall(page.read_
 @pytest.mark.parametrize("line", COMMANDS)
 def test_the_commands_of_the_pages_exist_with_their_options(line):
     command, words = app, shlex.split(re.split(r" {2,}", line.strip())[0], comments=True)
-    while isinstance(command, click.Group) and words and (named := command.get_command(Context(command), words[0])):
+    while (
+        isinstance(command, click.Group)
+        and words
+        and (named := command.get_command(Context(command), words[0]))
+    ):
         command = named
         words.pop(0)
     assert command is not app, line
     options = {option for each in command.params for option in each.opts + each.secondary_opts}
-    assert {word.partition("=")[0] for word in words if re.match("--?[a-z]", word)} - options == set()
+    assert {
+        word.partition("=")[0] for word in words if re.match("--?[a-z]", word)
+    } - options == set()

@@ -23,8 +23,16 @@ def screens():
     home = ddenv.workbench
     names = [module.name for module in walk_packages(home.__path__, f"{home.__name__}.")]
     found = [value for name in names for value in vars(import_module(name)).values()]
-    ours = {each for each in found if isinstance(each, type) and issubclass(each, Screen) and each.__module__ in names}
-    return {each.__name__ for each in ours if not any(other is not each and issubclass(other, each) for other in ours)}
+    ours = {
+        each
+        for each in found
+        if isinstance(each, type) and issubclass(each, Screen) and each.__module__ in names
+    }
+    return {
+        each.__name__
+        for each in ours
+        if not any(other is not each and issubclass(other, each) for other in ours)
+    }
 
 
 def test_every_screen_has_a_picture():
@@ -36,10 +44,14 @@ def test_the_page_shows_every_picture():
 
 
 def test_every_picture_was_made_and_is_still_needed():
-    assert {path.name for path in (DOCS / "screens").iterdir()} == {f"{name}.svg" for name in PICTURES}
+    assert {path.name for path in (DOCS / "screens").iterdir()} == {
+        f"{name}.svg" for name in PICTURES
+    }
 
 
-@pytest.mark.parametrize("path", sorted((DOCS / "screens").glob("*.svg")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted((DOCS / "screens").glob("*.svg")), ids=lambda path: path.stem
+)
 def test_pictures_tell_nothing_of_the_machine(path):
     text = path.read_text(encoding="utf-8")
     assert re.findall(r"/(?:home|root|work|Users|opt|wt)\b", text) == []
@@ -47,5 +59,7 @@ def test_pictures_tell_nothing_of_the_machine(path):
 
 def test_the_list_of_keys_has_every_key():
     page = workbench_keys.PAGE.read_text(encoding="utf-8")
-    assert workbench_keys.filled(page) == page, "python docs/workbench_keys.py writes the tables again"
+    assert workbench_keys.filled(page) == page, (
+        "python docs/workbench_keys.py writes the tables again"
+    )
     assert {id.partition(".")[0] for id in actions()} == set(workbench_keys.sections(page))

@@ -59,7 +59,14 @@ def test_a_whole_run_is_well_and_nothing_is_written(run):
     before = everything(run.parent)
     findings = run_health(run)
     assert is_well(findings) and everything(run.parent) == before
-    assert {finding.what for finding in findings} >= {"file", "log", "SQLite", "events", "made with", "engine"}
+    assert {finding.what for finding in findings} >= {
+        "file",
+        "log",
+        "SQLite",
+        "events",
+        "made with",
+        "engine",
+    }
 
 
 def test_what_a_killed_engine_left_is_part_of_the_run_and_stays_where_it_is(tmp_path):
@@ -81,8 +88,12 @@ def test_what_a_killed_engine_left_is_part_of_the_run_and_stays_where_it_is(tmp_
         assert len(file.events()) == events
 
 
-@pytest.mark.parametrize("part", slow(pytest.mark.fuzz, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9], but=[0.8]))
-def test_what_is_whole_of_a_damaged_file_is_repaired_into_a_copy_and_goes_on_to_the_same_end(made, run, part):
+@pytest.mark.parametrize(
+    "part", slow(pytest.mark.fuzz, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9], but=[0.8])
+)
+def test_what_is_whole_of_a_damaged_file_is_repaired_into_a_copy_and_goes_on_to_the_same_end(
+    made, run, part
+):
     spoil(run, part)
     before, copy = everything(run.parent), run.parent / "copy.ddenv"
     assert wrong(run)
@@ -91,7 +102,9 @@ def test_what_is_whole_of_a_damaged_file_is_repaired_into_a_copy_and_goes_on_to_
     except UserError as error:
         assert "nothing can be repaired" in str(error) and not copy.exists()
         return
-    assert {name: content for name, content in everything(run.parent).items() if name != copy.name} == before
+    assert {
+        name: content for name, content in everything(run.parent).items() if name != copy.name
+    } == before
     with RunFile(copy) as file:
         assert faults(file) == [] and whole(file).trouble == ""
     assert story(drive(copy, FakePool(oracle, 2))) == made[1]
@@ -160,7 +173,13 @@ def test_a_copy_never_replaces_a_file(run):
 
 @pytest.mark.parametrize(
     ("words", "code"),
-    [((), 0), (("RUN",), 0), (("none",), 2), (("--repair", "x"), 2), (("RUN", "--repair", "RUN"), 2)],
+    [
+        ((), 0),
+        (("RUN",), 0),
+        (("none",), 2),
+        (("--repair", "x"), 2),
+        (("RUN", "--repair", "RUN"), 2),
+    ],
 )
 def test_exit_codes(run, home, words, code, command):
     said = command("doctor", *(str(run) if word == "RUN" else word for word in words))
@@ -173,7 +192,10 @@ def test_what_is_wrong_is_an_exit_code_and_json(run, home, command):
     said = command("doctor", run, "--json")
     told = json.loads(said.stdout)
     assert said.returncode == 1 and told["well"] is False
-    assert any(each["state"] == "wrong" and "not a ddenv run file" in each["says"] for each in told["findings"])
+    assert any(
+        each["state"] == "wrong" and "not a ddenv run file" in each["says"]
+        for each in told["findings"]
+    )
 
 
 def test_what_is_not_installed_is_wrong(monkeypatch):

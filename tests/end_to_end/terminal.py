@@ -22,13 +22,25 @@ class Terminal:
         self.server = f"ddenv-{uuid.uuid4().hex[:8]}"
         command = ["env", f"DDENV_HOME={home}", "TERM=xterm-256color", *program, *map(str, words)]
         self.tmux(
-            "-f", "/dev/null", "new-session", "-d", "-c", str(home), "-x", str(width), "-y", str(height), *command
+            "-f",
+            "/dev/null",
+            "new-session",
+            "-d",
+            "-c",
+            str(home),
+            "-x",
+            str(width),
+            "-y",
+            str(height),
+            *command,
         )
 
     def tmux(self, *words):
         environment = {name: value for name, value in os.environ.items() if name != "TMUX"}
         command = ["tmux", "-L", self.server, *words]
-        return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE).stdout
+        return subprocess.run(
+            command, capture_output=True, text=True, env=environment, timeout=PATIENCE
+        ).stdout
 
     def screen(self):
         return self.tmux("capture-pane", "-p")

@@ -12,7 +12,9 @@ from tests.waiting import wait_until
 @pytest.fixture
 def baseline(terminal, tmp_path):
     """A run of all six models that is paused after its baseline."""
-    first = terminal(80, 24, "run", DATA / "wall.yaml", "--name", "one", "--jobs", "1", "--no-slice")
+    first = terminal(
+        80, 24, "run", DATA / "wall.yaml", "--name", "one", "--jobs", "1", "--no-slice"
+    )
     first.see("baseline")
     run = tmp_path / "runs" / "one.ddenv"
     with RunFile(run) as viewer:

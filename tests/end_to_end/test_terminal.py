@@ -10,7 +10,9 @@ from tests.waiting import wait_until
 
 
 @pytest.mark.terminal
-@pytest.mark.parametrize(("width", "height"), [pytest.param(120, 36), pytest.param(80, 24, marks=pytest.mark.witness)])
+@pytest.mark.parametrize(
+    ("width", "height"), [pytest.param(120, 36), pytest.param(80, 24, marks=pytest.mark.witness)]
+)
 def test_pause_step_accept_and_a_killed_terminal(terminal, tmp_path, width, height):
     first = terminal(width, height, "run", DATA / "wall.yaml", "--name", "one", "--jobs", "1")
     first.see("baseline")
@@ -36,7 +38,12 @@ def test_pause_step_accept_and_a_killed_terminal(terminal, tmp_path, width, heig
     made = len(state_of(run).finished_tests)
     bench.kill()
     # The engine goes on.
-    wait_until(lambda: len(state_of(run).finished_tests) > made or state_of(run).status in ("waiting", "finished"))
+    wait_until(
+        lambda: (
+            len(state_of(run).finished_tests) > made
+            or state_of(run).status in ("waiting", "finished")
+        )
+    )
     assert engine_is_alive(run) or state_of(run).status == "finished"
     again = terminal(width, height, "open", "one")
     again.see("The reduction waits for you")

@@ -53,7 +53,18 @@ def result(outcome: str, seed: int, x: float, cut: bool = False) -> RunResult:
     trajectory = np.zeros((3, 8))
     trajectory[:, 0], trajectory[:, 1], trajectory[:, 4] = (0, 1, 2), (0, x / 2, x), 1
     failure = "stuck" if outcome == "failed" else ""
-    return RunResult(outcome=outcome, failure=failure, trajectory=trajectory, motions={}, simulated_seconds=2.0, wall_seconds=0.01, seed=seed, first_sensed=SENSED, first_touched=TOUCHED, cut=cut)
+    return RunResult(
+        outcome=outcome,
+        failure=failure,
+        trajectory=trajectory,
+        motions={},
+        simulated_seconds=2.0,
+        wall_seconds=0.01,
+        seed=seed,
+        first_sensed=SENSED,
+        first_touched=TOUCHED,
+        cut=cut,
+    )
 
 
 class FakePool:
@@ -110,7 +121,9 @@ class FakePool:
         self.made.append((keep, seed))
         cut = "" if full else self.cut(keep, seed)
         shown = cut or (
-            self.changed(keep, seed, dict(changes)) if changes and self.changed else self.oracle(keep, seed)
+            self.changed(keep, seed, dict(changes))
+            if changes and self.changed
+            else self.oracle(keep, seed)
         )
         if shown == "error":
             return [(test, Broken("error", "it broke"))]
@@ -125,14 +138,20 @@ class FakePool:
 
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
         looks = iter([None] * self.settling)
-        settled = self.supports if isinstance(self.supports, Broken) else Start(self.supports, self.settled, self.ties)
+        settled = (
+            self.supports
+            if isinstance(self.supports, Broken)
+            else Start(self.supports, self.settled, self.ties)
+        )
         return lambda: next(looks, settled)
 
     def live(self) -> list[tuple[Live, float]]:
         return self.pace
 
 
-def new_run(folder: Path, *, early_stop: bool = False, world: Path = DATA / "wall.sdf", **reduction) -> Path:
+def new_run(
+    folder: Path, *, early_stop: bool = False, world: Path = DATA / "wall.sdf", **reduction
+) -> Path:
     """A run file of the small world, reduced as printed: the tests know the paper's rounds, and oracles a run by its seed."""
     usual = PRINTED | CHEAP | {"early_stop": early_stop, "seeds": "consecutive"}
     path = folder / f"run-{len(list(folder.iterdir()))}.ddenv"

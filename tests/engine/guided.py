@@ -49,7 +49,9 @@ def until(condition):
         state = yield
         if condition(state):
             return state
-    raise AssertionError(f"{state.status}, round {state.round and state.round.number}, {state.decisions}")
+    raise AssertionError(
+        f"{state.status}, round {state.round and state.round.number}, {state.decisions}"
+    )
 
 
 def guided(path, oracle, guide, jobs=1):
@@ -63,7 +65,10 @@ COMMANDS = st.one_of(
         st.fixed_dictionaries({"models": st.lists(st.integers(0, 5), min_size=1, max_size=4)}),
     ),
     st.tuples(st.just("adopt"), st.fixed_dictionaries({"trial": st.integers(1, 3)})),
-    st.tuples(st.just("accept_other"), st.fixed_dictionaries({"test": st.integers(1, 40), "instead": st.booleans()})),
+    st.tuples(
+        st.just("accept_other"),
+        st.fixed_dictionaries({"test": st.integers(1, 40), "instead": st.booleans()}),
+    ),
     st.tuples(st.just("undo"), st.just({})),
     st.tuples(st.just("go_back"), st.fixed_dictionaries({"node": st.integers(0, 4)})),
     st.tuples(
@@ -73,7 +78,9 @@ COMMANDS = st.one_of(
                 "settings": st.fixed_dictionaries(
                     {},
                     optional={
-                        "pair": st.sampled_from(["learner/timestep", "timeseg/random", "model2model/sequential"]),
+                        "pair": st.sampled_from(
+                            ["learner/timestep", "timeseg/random", "model2model/sequential"]
+                        ),
                         "iterations": st.integers(0, 2),
                         "algorithm": st.sampled_from(["ddmin", "splitting", "ddenv"]),
                         "accept_rate": st.sampled_from(["first", "kept", "exact"]),

@@ -19,7 +19,15 @@ class Hostile:
         return getattr(self, min(keep))(seed)
 
     def ends(self, seed):
-        return RunResult(outcome="pass", failure="", trajectory=np.zeros((2, 8)), motions={}, simulated_seconds=1.0, wall_seconds=0.0, seed=seed)
+        return RunResult(
+            outcome="pass",
+            failure="",
+            trajectory=np.zeros((2, 8)),
+            motions={},
+            simulated_seconds=1.0,
+            wall_seconds=0.0,
+            seed=seed,
+        )
 
     def segfaults(self, seed):
         print("first line\n\n  last\x1b line", flush=True)
@@ -59,4 +67,12 @@ class DiesWithoutTheBeam:
         failed = "wall" in keep
         way = np.zeros((3, 8))
         way[:, 0], way[:, 1], way[:, 4] = (0, 1, 2), (0, 1, 2.0 if failed else 4.0), 1
-        return RunResult(outcome="failed" if failed else "pass", failure="stuck" if failed else "", trajectory=way, motions={}, simulated_seconds=2.0, wall_seconds=0.01, seed=seed)
+        return RunResult(
+            outcome="failed" if failed else "pass",
+            failure="stuck" if failed else "",
+            trajectory=way,
+            motions={},
+            simulated_seconds=2.0,
+            wall_seconds=0.01,
+            seed=seed,
+        )

@@ -28,7 +28,12 @@ def finished_tests(path):
 
 def story(state):
     """What a run's rounds came to: all that must not depend on who worked on it."""
-    return state.environment, state.minimal, state.rounds_done, [point.models for point in state.history]
+    return (
+        state.environment,
+        state.minimal,
+        state.rounds_done,
+        [point.models for point in state.history],
+    )
 
 
 def killed(path, pool, moments, **options):
@@ -36,7 +41,9 @@ def killed(path, pool, moments, **options):
     for moment in moments:
         pool.running.clear()
         try:
-            return drive(path, pool, prepare=lambda file, after=moment: kill_after(file, after), **options)
+            return drive(
+                path, pool, prepare=lambda file, after=moment: kill_after(file, after), **options
+            )
         except Killed:
             pass
     return None

@@ -17,7 +17,9 @@ def wide_world(folder: Path) -> Path:
     """A world of `MODELS`, of which one can move: so the simulator is asked for ties."""
     before, _ = (DATA / "wall.sdf").read_text().split('<model name="wall">')
     inertial = "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>"
-    collision = '<collision name="c"><geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision>'
+    collision = (
+        '<collision name="c"><geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision>'
+    )
     boxes = "".join(
         f'<model name="{name}"><static>{str(number > 0).lower()}</static><pose>{2 + number % 6} {number // 6 - 2} 0.3 0 0 0</pose>'
         f'<link name="link">{inertial}{collision}</link></model>'
@@ -58,7 +60,11 @@ class Participation:
         for _ in range(self.looks):
             # Few of them are near the robot's way.
             finds(MODELS[bits % 97 % 9])
-        outcome = "similar" if all(finds(name) for name in self.needed) and bits % 10 < self.tenths else "pass"
+        outcome = (
+            "similar"
+            if all(finds(name) for name in self.needed) and bits % 10 < self.tenths
+            else "pass"
+        )
         return "other" if outcome == "pass" and bits % 7 == 0 else outcome, frozenset(met), bits
 
     def pool(self, jobs: int = 1, seed: int = 0) -> FakePool:
@@ -70,7 +76,10 @@ class Participation:
     def senses(self, keep: Keep, seed: int) -> dict[str, float]:
         """When each model is in view. For models that did not affect the run this differs between worlds with equal runs."""
         met = self.run(keep, seed)[1]
-        order = {name: crc32(f"{seed} {name} {'' if name in met else sorted(keep)}".encode()) % 100 for name in keep}
+        order = {
+            name: crc32(f"{seed} {name} {'' if name in met else sorted(keep)}".encode()) % 100
+            for name in keep
+        }
         return {name: place / 10 for name, place in order.items() if name in met or place % 2}
 
     def told(self, pool: FakePool) -> FakePool:

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from ddenv.runfile.events import CandidateJudged, CertificateFinished, Finished, LeftOut, RateLost, Reduced
+from ddenv.runfile.events import (
+    CandidateJudged,
+    CertificateFinished,
+    Finished,
+    LeftOut,
+    RateLost,
+    Reduced,
+)
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import BROKEN
 from tests.engine.fake import FakePool, drive
@@ -44,7 +51,11 @@ def decided(path):
                 found.append((event.round, event.candidate, event.verdict, named(event.tests)))
             case Reduced():
                 found.append(
-                    (event.round, event.candidate, state.environments[event.environment].names(state.elements))
+                    (
+                        event.round,
+                        event.candidate,
+                        state.environments[event.environment].names(state.elements),
+                    )
                 )
             case RateLost():
                 found.append((event.node, event.lost, event.again, named(event.tests)))
@@ -52,11 +63,16 @@ def decided(path):
                 found.append(("left out", event.without))
             case CertificateFinished():
                 assert {state.tests[test - 1].phase for test in event.tests} == {"certify"}
-                claims = [(one.without, one.verdict, one.shown, one.runs, one.outcomes) for one in event.claims]
+                claims = [
+                    (one.without, one.verdict, one.shown, one.runs, one.outcomes)
+                    for one in event.claims
+                ]
                 found.append((claims, named(event.tests)))
             case Finished():
                 found.append(event)
-    made = [(test.environment, test.run) for test in state.finished_tests if test.outcome not in BROKEN]
+    made = [
+        (test.environment, test.run) for test in state.finished_tests if test.outcome not in BROKEN
+    ]
     assert len(made) == len(set(made)), "a test was made twice"
     found.append(named(state.leg.tests))
     return found, state
@@ -74,7 +90,9 @@ def decided(path):
 # A search that begins again after rounds that were made ahead of time.
 @example(salt=0, needed=frozenset(MODELS[2:4]), fewer=0.2, rate=1.0, workers=8, seed=3)
 @examples(0.2)
-def test_any_number_of_workers_comes_to_the_same_verdicts(salt, needed, fewer, rate, workers, seed, method):
+def test_any_number_of_workers_comes_to_the_same_verdicts(
+    salt, needed, fewer, rate, workers, seed, method
+):
     oracle = at_rates(salt, (needed, rate), (needed - {min(needed)}, fewer))
     with tempfile.TemporaryDirectory() as folder:
         alone = sliced_run(Path(folder), **method)
@@ -98,7 +116,10 @@ def test_an_engine_that_goes_on_knows_what_was_made_ahead(moments, salt):
         killed(path, simulated.pool(64), moments)
         for workers in (8, 1):
             drive(path, simulated.pool(workers))
-        journeys = [[one for one in decided(each)[0] if not isinstance(one, Finished)] for each in (path, alone)]
+        journeys = [
+            [one for one in decided(each)[0] if not isinstance(one, Finished)]
+            for each in (path, alone)
+        ]
         assert journeys[0] == journeys[1]
 
 
@@ -123,7 +144,9 @@ def test_idle_workers_make_nothing_of_later_rounds(runs):
     _, (state, _) = runs
     phases = [test.phase for test in state.tests]
     assert set(phases) <= {"baseline", "round", "audit", "certify"}
-    assert phases.index("certify") > max(place for place, phase in enumerate(phases) if phase == "round")
+    assert phases.index("certify") > max(
+        place for place, phase in enumerate(phases) if phase == "round"
+    )
     rounds = [test.round for test in state.tests if test.phase == "round"]
     assert rounds == sorted(rounds)
 

@@ -25,7 +25,9 @@ SPEC = FailureSpec(epsilon=0.5)
 
 
 def way(*points) -> np.ndarray:
-    return np.array([(float(time), *point, 0.0, 1.0, 0.0, 0.0, 0.0) for time, point in enumerate(points)])
+    return np.array(
+        [(float(time), *point, 0.0, 1.0, 0.0, 0.0, 0.0) for time, point in enumerate(points)]
+    )
 
 
 def ran(*outcomes, spec: FailureSpec = SPEC, wanted: int = 1, chose: int = 0):
@@ -33,10 +35,25 @@ def ran(*outcomes, spec: FailureSpec = SPEC, wanted: int = 1, chose: int = 0):
     tests, ways = [], {}
     for run, one in enumerate(outcomes):
         outcome, kind, rows = (
-            (one, "broken" if one == "error" else "", None) if isinstance(one, str) else ("failed", *one)
+            (one, "broken" if one == "error" else "", None)
+            if isinstance(one, str)
+            else ("failed", *one)
         )
         end = None if rows is None else tuple(rows[-1, 1:])
-        tests.append(Ran(id=run + 1, environment=0, phase="baseline", round=None, candidate=None, run=run, seed=run, outcome=outcome, failure=kind, end_pose=end))
+        tests.append(
+            Ran(
+                id=run + 1,
+                environment=0,
+                phase="baseline",
+                round=None,
+                candidate=None,
+                run=run,
+                seed=run,
+                outcome=outcome,
+                failure=kind,
+                end_pose=end,
+            )
+        )
         if rows is not None:
             ways[run + 1] = rows
     return fix_failure(tests, ways, spec, 3, wanted, chose, usual=len(tests))
@@ -47,7 +64,17 @@ def stuck(x: float, kind: str = "stuck"):
 
 
 def test_f_is_the_end_that_most_runs_share():
-    found = ran(stuck(9), stuck(20), stuck(30), stuck(0.2), stuck(0.1), stuck(-20), stuck(-30), stuck(0), stuck(0.1))
+    found = ran(
+        stuck(9),
+        stuck(20),
+        stuck(30),
+        stuck(0.2),
+        stuck(0.1),
+        stuck(-20),
+        stuck(-30),
+        stuck(0),
+        stuck(0.1),
+    )
     assert (found.failure_test, found.failures, found.runs) == (5, 4, 9)
     assert found.position == (0.1, 0.0, 0.0)
     assert [each.runs for each in found.seen] == [4, 1, 1, 1, 1, 1]
@@ -58,7 +85,9 @@ def test_runs_that_broke_are_not_in_the_rate():
     assert (found.failures, found.runs, found.broken, found.rate) == (2, 3, 2, pytest.approx(2 / 3))
     assert (found.miss_chance, found.iterations_95) == (pytest.approx((1 / 3) ** 4), 2)
     assert "all 1 baseline runs (1 more broke" in ran("error", "pass")
-    assert "shows in less than 26 % of all runs (95 %): --baseline-runs 30 looks further" in ran(*["pass"] * 10)
+    assert "shows in less than 26 % of all runs (95 %): --baseline-runs 30 looks further" in ran(
+        *["pass"] * 10
+    )
     assert ran("error", "error") == "no baseline run finished: broken"
 
 
@@ -87,7 +116,14 @@ def test_another_failure_can_be_chosen_by_its_number():
     ]
     second = ran(*runs, wanted=2)
     assert (second.failure_test, second.failures, second.position) == (1, 2, (5.0, 0.0, 0.0))
-    assert second.judged.outcomes == {1: "similar", 2: "other", 3: "other", 5: "other", 6: "similar", 7: "other"}
+    assert second.judged.outcomes == {
+        1: "similar",
+        2: "other",
+        3: "other",
+        5: "other",
+        6: "similar",
+        7: "other",
+    }
     assert ran(*runs, wanted=4) == (
         "there is no failure number 4; 7 runs of the whole world showed these: 1. stuck or out of time at (1.00, 0.00) in 3 runs; "
         "2. fell at (5.00, 0.00) in 2 runs; 3. lost at (-9.00, 0.00) in 1 run"
@@ -100,7 +136,14 @@ def test_the_runs_that_chose_f_are_not_in_its_rate():
     assert (found.failure_test, found.position, found.chose) == (1, (1.0, 0.0, 0.0), 4)
     assert (found.failures, found.runs, found.broken, found.rate) == (1, 4, 1, 0.25)
     assert [one.runs for one in found.seen] == [2, 1]
-    assert found.judged.outcomes == {1: "similar", 2: "similar", 3: "other", 5: "other", 6: "other", 7: "similar"}
+    assert found.judged.outcomes == {
+        1: "similar",
+        2: "similar",
+        3: "other",
+        5: "other",
+        6: "other",
+        7: "similar",
+    }
     # Where none of the others shows f, its rate is from all.
     found = ran(*chosen, "pass", stuck(5), chose=4)
     assert (found.chose, found.failures, found.runs, found.broken) == (0, 2, 5, 1)
@@ -134,8 +177,15 @@ def last_baseline(folder, oracle, jobs: int, kill_every: int, baseline_runs: int
     if state.baseline is None:
         return None, state.status, sorted(runs)
     # The numbers of tests depend on how often an engine was killed.
-    seen = [(state.tests[one.test - 1].run, one.runs, one.kinds, one.position) for one in state.baseline.seen]
-    return replace(state.baseline, failure_test=0, judged=Outcomes({}, {}), seen=()), seen, sorted(runs)
+    seen = [
+        (state.tests[one.test - 1].run, one.runs, one.kinds, one.position)
+        for one in state.baseline.seen
+    ]
+    return (
+        replace(state.baseline, failure_test=0, judged=Outcomes({}, {}), seen=()),
+        seen,
+        sorted(runs),
+    )
 
 
 def _kill_at_end_of_baseline(file: RunFile, events: int) -> None:
@@ -157,13 +207,21 @@ def test_where_few_runs_show_f_the_baseline_goes_on_in_the_same_way_for_all_engi
     oracle = rare(0.2, salt)
     usual = last_baseline(tmp_path, oracle, 1, 10_000)
     found, status, runs = usual
-    assert last_baseline(tmp_path, oracle, 3, 10_000) == last_baseline(tmp_path, oracle, 2, 25) == usual
+    assert (
+        last_baseline(tmp_path, oracle, 3, 10_000)
+        == last_baseline(tmp_path, oracle, 2, 25)
+        == usual
+    )
     if found is None:
         assert (status, runs) == ("finished", [0, 1, 2, 3])
     else:
         assert len(runs) == found.chose + found.runs + found.broken
         # No run more than needed.
-        assert len(runs) - found.chose == 4 or (found.failures == FEWEST_SHOWN) or (len(runs) == LONGEST_BASELINE)
+        assert (
+            len(runs) - found.chose == 4
+            or (found.failures == FEWEST_SHOWN)
+            or (len(runs) == LONGEST_BASELINE)
+        )
         assert found.failures >= FEWEST_SHOWN or len(runs) == LONGEST_BASELINE
 
 
@@ -185,18 +243,31 @@ def test_where_failures_compete_the_rate_of_the_luckiest_is_not_too_high(tmp_pat
     assert sum(one.chose == 10 for one, _, _ in found) >= 80
     rates = sum(one.rate for one, _, _ in found), sum(seen[0][1] / 10 for _, seen, _ in found)
     # The runs that choose show the luckier one in 0.56 of all.
-    assert [rate / len(found) for rate in rates] == [pytest.approx(0.45, abs=0.05), pytest.approx(0.56, abs=0.05)]
+    assert [rate / len(found) for rate in rates] == [
+        pytest.approx(0.45, abs=0.05),
+        pytest.approx(0.56, abs=0.05),
+    ]
     # However many work, and however often they are killed.
     assert last_baseline(tmp_path, oracles[0], 3, 25, 10) == found[0]
 
 
 def test_a_search_judges_by_the_rate_of_the_runs_that_chose_nothing(tmp_path):
     state = drive(
-        new_run(tmp_path, accept_rate="kept", baseline_runs=10, iterations=1), FakePool(competing(0.45, 3), 2)
+        new_run(tmp_path, accept_rate="kept", baseline_runs=10, iterations=1),
+        FakePool(competing(0.45, 3), 2),
     )
     base = state.baseline
-    shown = [test.outcome == "similar" for test in state.tests if test.phase == "baseline" and test.run >= 10]
-    assert (base.chose, base.failures, base.runs, base.rate) == (10, sum(shown), len(shown), sum(shown) / len(shown))
+    shown = [
+        test.outcome == "similar"
+        for test in state.tests
+        if test.phase == "baseline" and test.run >= 10
+    ]
+    assert (base.chose, base.failures, base.runs, base.rate) == (
+        10,
+        sum(shown),
+        len(shown),
+        sum(shown) / len(shown),
+    )
     assert state.certificates[0].rate == estimated_rate(sum(shown), len(shown))
     assert (state.nodes[0].shown, len(state.nodes[0].runs)) == (sum(shown), len(shown))
     said = baseline(state)

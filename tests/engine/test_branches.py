@@ -25,13 +25,19 @@ def test_another_failure_is_reduced_in_a_branch_and_f_is_f_again_outside_of_it(t
         yield "accept_other", {"test": test.id, "instead": True}
         state = yield from until(lambda state: state.here.how == "instead")
         assert set(state.environment) == set(state.models_of(test)) > {"wall"}
-        assert (state.here.parent, state.failures, state.f_position) == (test.node, (test.id,), test.end_pose[:3])
+        assert (state.here.parent, state.failures, state.f_position) == (
+            test.node,
+            (test.id,),
+            test.end_pose[:3],
+        )
         # What was f is another failure here.
         assert {state.tests[one - 1].outcome for one in whole} == {"other"}
         assert not state.pinned
         branch = state.node
         yield "resume", {}
-        state = yield from until(lambda state: state.nodes[branch].number != state.node and state.here.parent == branch)
+        state = yield from until(
+            lambda state: state.nodes[branch].number != state.node and state.here.parent == branch
+        )
         assert "beam" not in state.environment
         yield "go_back", {"node": 0}
         state = yield from until(lambda state: state.node == 0)
@@ -62,7 +68,14 @@ def test_a_branch_has_to_keep_the_rate_of_its_own_failure_where_it_begins(tmp_pa
         other = next(test.id for test in state.tests if test.outcome == "other")
         yield "accept_other", {"test": other, "instead": True}
 
-    path = new_run(tmp_path, accept_rate="kept", growth="steady", skip="implied", baseline_runs=10, keep_rate=0.8)
+    path = new_run(
+        tmp_path,
+        accept_rate="kept",
+        growth="steady",
+        skip="implied",
+        baseline_runs=10,
+        keep_rate=0.8,
+    )
     state = drive(path, Guided(path, oracle, guide(), 2))
     assert (state.environment, state.minimal) == (("wall",), True)
     assert (
@@ -106,13 +119,17 @@ def test_what_was_undone_is_called_so_and_can_be_allowed_again(tmp_path):
     seen = []
     state = guided(new_run(tmp_path), needs("wall"), guide())
     assert seen == ["undone"]
-    assert state.decisions[-1].kind == "unveto" and state.decisions[-1].words.startswith("allowed part ")
+    assert state.decisions[-1].kind == "unveto" and state.decisions[-1].words.startswith(
+        "allowed part "
+    )
     assert state.environment == ("wall",)
 
 
 def test_an_end_above_a_smaller_environment_that_showed_f_says_so(tmp_path):
     def guide():
-        state = yield from until(lambda state: state.status == "running" and len(state.environment) == 1)
+        state = yield from until(
+            lambda state: state.status == "running" and len(state.environment) == 1
+        )
         assert state.environment == ("wall",)
         yield "undo", {}
 
@@ -121,7 +138,10 @@ def test_an_end_above_a_smaller_environment_that_showed_f_says_so(tmp_path):
     assert len(state.environment) > 1
     said = smaller_known(state)
     undone = next(node for node in state.nodes if node.rejected)
-    assert said == f"a smaller environment is known to show f: 1 model (#{undone.number} in the history, taken back)"
+    assert (
+        said
+        == f"a smaller environment is known to show f: 1 model (#{undone.number} in the history, taken back)"
+    )
     assert said in ended(state)
     assert smaller_known(drive(new_run(tmp_path), FakePool(needs("wall"), 1))) == ""
 

@@ -89,7 +89,11 @@ def test_a_command_that_went_missing_is_told(tmp_path):
     scenario = own_scenario(tmp_path, SLEEP)
     parts = load_parts(scenario)
     pool = Pool(
-        scenario.model_copy(update={"oracle": scenario.oracle.model_copy(update={"command": "./gone"})}), *parts, 1
+        scenario.model_copy(
+            update={"oracle": scenario.oracle.model_copy(update={"command": "./gone"})}
+        ),
+        *parts,
+        1,
     )
     try:
         pool.submit(1, Run(keep=EVERYTHING, seed=0))
@@ -99,7 +103,9 @@ def test_a_command_that_went_missing_is_told(tmp_path):
         pool.close()
 
 
-@pytest.mark.parametrize("way", slow(pytest.mark.programs, ["killed", "terminated", "stopped"], but=["killed"]))
+@pytest.mark.parametrize(
+    "way", slow(pytest.mark.programs, ["killed", "terminated", "stopped"], but=["killed"])
+)
 def test_an_engine_that_ends_takes_its_commands_along(tmp_path, token, way):
     run = tmp_path / "run.ddenv"
     create_trusted(own_scenario(tmp_path, FAMILY + SLEEP), run)
@@ -131,7 +137,9 @@ BREAKS = """
 @pytest.mark.programs
 def test_a_simulator_that_is_out_of_order_stops_the_engine_and_it_can_go_on(tmp_path):
     run = tmp_path / "run.ddenv"
-    scenario = own_scenario(tmp_path, BREAKS, "{world}", baseline_runs=3, iterations=1, growth="paper", skip="known")
+    scenario = own_scenario(
+        tmp_path, BREAKS, "{world}", baseline_runs=3, iterations=1, growth="paper", skip="known"
+    )
     create_trusted(scenario, run)
     done = _resume(run)
     assert done.returncode == 2
@@ -151,7 +159,9 @@ def test_a_simulator_that_is_out_of_order_stops_the_engine_and_it_can_go_on(tmp_
     # What broke proves nothing.
     assert state.minimal == (set(state.environment) == {"deck", "wall"})
     # No finished test was made again, but for the replays of runs that showed f.
-    made = len((tmp_path / "made").read_text()) - sum(event.kind == "comparing" for event in events(run))
+    made = len((tmp_path / "made").read_text()) - sum(
+        event.kind == "comparing" for event in events(run)
+    )
     assert made - 2 <= sum(test.is_finished for test in state.tests) <= made
 
 
@@ -163,7 +173,12 @@ def _resume(run: Path) -> subprocess.CompletedProcess:
 @pytest.mark.programs
 def test_where_all_of_the_baseline_breaks_there_is_nothing_to_reduce(tmp_path):
     run = tmp_path / "run.ddenv"
-    create_trusted(own_scenario(tmp_path, "import sys; print('no licence', file=sys.stderr); sys.exit(7)"), run)
+    create_trusted(
+        own_scenario(tmp_path, "import sys; print('no licence', file=sys.stderr); sys.exit(7)"), run
+    )
     done = _resume(run)
     assert done.returncode == 1
-    assert "no baseline run finished: the command's exit code is 7, neither 0 nor 1: no licence" in done.stdout
+    assert (
+        "no baseline run finished: the command's exit code is 7, neither 0 nor 1: no licence"
+        in done.stdout
+    )

@@ -22,8 +22,14 @@ from tests.engine.oracles import needs
 from tests.engine.reading import models_in, state_of, told
 from tests.tiers import examples
 
-METHODS = [{}, {"algorithm": "splitting"}, {"pair": "learner/timestep", "growth": "steady", "skip": "implied"}]
-every_method = pytest.mark.parametrize("method", METHODS, ids=lambda method: "-".join(method.values()) or "own")
+METHODS = [
+    {},
+    {"algorithm": "splitting"},
+    {"pair": "learner/timestep", "growth": "steady", "skip": "implied"},
+]
+every_method = pytest.mark.parametrize(
+    "method", METHODS, ids=lambda method: "-".join(method.values()) or "own"
+)
 
 
 def at_rates(salt, *rates):
@@ -31,7 +37,9 @@ def at_rates(salt, *rates):
 
     def oracle(keep, seed):
         rate = next((rate for needed, rate in rates if needed <= keep), 0.0)
-        return "similar" if crc32(f"{salt} {sorted(keep)} {seed}".encode()) / 2**32 < rate else "pass"
+        return (
+            "similar" if crc32(f"{salt} {sorted(keep)} {seed}".encode()) / 2**32 < rate else "pass"
+        )
 
     return oracle
 
@@ -92,7 +100,9 @@ def test_as_printed_the_certificate_says_that_the_rate_is_lost_and_changes_nothi
             break
     assert state.environment == ("wall",)
     assert not state.minimal
-    assert state.reason.startswith("what is left keeps less than 50 % of the whole world's rate: f in ")
+    assert state.reason.startswith(
+        "what is left keeps less than 50 % of the whole world's rate: f in "
+    )
     assert len(state.certificates) == 1
 
 
@@ -135,7 +145,9 @@ def test_a_lost_rate_is_found_by_bisection_and_the_search_goes_on_from_there(tmp
 def test_a_model_that_certificates_show_as_needless_is_left_out(tmp_path):
     # Without the ball the seeds of the search miss f, fresh ones do not.
     def oracle(keep, seed):
-        return "similar" if "wall" in keep and ("ball" in keep or seed >= FIRST_FRESH_RUN) else "pass"
+        return (
+            "similar" if "wall" in keep and ("ball" in keep or seed >= FIRST_FRESH_RUN) else "pass"
+        )
 
     state = drive(kept(tmp_path), FakePool(oracle, 2))
     assert state.environment == ("wall",)
@@ -222,7 +234,9 @@ def test_a_failure_that_no_fresh_run_shows_needs_nothing_and_proves_nothing(tmp_
     state = drive(kept(tmp_path, baseline_runs=10), FakePool(oracle, 2))
     assert state.status == "finished"
     assert not state.minimal
-    assert not any(claim.verdict in ("kept", "needed", "not needed") for claim in state.certificates[-1].claims)
+    assert not any(
+        claim.verdict in ("kept", "needed", "not needed") for claim in state.certificates[-1].claims
+    )
 
 
 def test_the_budget_counts_the_tests_of_the_certificate(tmp_path):
@@ -234,7 +248,12 @@ def test_the_budget_counts_the_tests_of_the_certificate(tmp_path):
     assert state.tests_done == 30
 
 
-DRIFTING = [({"wall", "beam", "ball"}, 1.0), ({"wall", "beam"}, 0.9), ({"wall"}, 0.4), (set(), 0.02)]
+DRIFTING = [
+    ({"wall", "beam", "ball"}, 1.0),
+    ({"wall", "beam"}, 0.9),
+    ({"wall"}, 0.4),
+    (set(), 0.02),
+]
 
 
 def certificates(state):
@@ -242,13 +261,20 @@ def certificates(state):
     return [
         (
             replace(certificate, claims=()),
-            [(replace(claim, environment=0), state.environments[claim.environment]) for claim in certificate.claims],
+            [
+                (replace(claim, environment=0), state.environments[claim.environment])
+                for claim in certificate.claims
+            ],
         )
         for certificate in state.certificates
     ]
 
 
-@given(salt=st.integers(0, 30), moments=st.lists(st.integers(1, 250), min_size=1, max_size=4), jobs=st.integers(1, 3))
+@given(
+    salt=st.integers(0, 30),
+    moments=st.lists(st.integers(1, 250), min_size=1, max_size=4),
+    jobs=st.integers(1, 3),
+)
 @examples(0.3)
 def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs):
     oracle = at_rates(salt, *DRIFTING)

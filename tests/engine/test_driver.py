@@ -27,7 +27,9 @@ from tests.tiers import examples
 @pytest.mark.parametrize("pair", ["model2model/failure-proximal", "learner/timestep"])
 def test_every_algorithm_finds_the_needed_models(tmp_path, algorithm, pair):
     """`tests/reduction` has every pair: an engine gives them all the same evidence."""
-    state = drive(new_run(tmp_path, algorithm=algorithm, pair=pair), FakePool(needs("wall", "beam"), 2))
+    state = drive(
+        new_run(tmp_path, algorithm=algorithm, pair=pair), FakePool(needs("wall", "beam"), 2)
+    )
     # In the order of the world, whatever order the algorithm has them in.
     assert state.environment == tuple(name for name in ELEMENTS if name in ("wall", "beam"))
     assert state.minimal and state.status == "finished"
@@ -35,7 +37,9 @@ def test_every_algorithm_finds_the_needed_models(tmp_path, algorithm, pair):
 
 def test_the_settings_of_the_scenario_reach_the_algorithm(tmp_path):
     exact = drive(new_run(tmp_path), FakePool(needs("wall", "beam"), 1))
-    fewer = drive(new_run(tmp_path, growth="steady", skip="implied"), FakePool(needs("wall", "beam"), 1))
+    fewer = drive(
+        new_run(tmp_path, growth="steady", skip="implied"), FakePool(needs("wall", "beam"), 1)
+    )
     assert fewer.environment == exact.environment
     assert len(fewer.tests) < len(exact.tests)
 
@@ -47,7 +51,9 @@ METHODS = [
     {"pair": "trajectoryseg/min-trajectory-proximal", "growth": "steady", "skip": "implied"},
     {"algorithm": "splitting"},
 ]
-every_method = pytest.mark.parametrize("method", METHODS, ids=lambda method: "-".join(method.values()))
+every_method = pytest.mark.parametrize(
+    "method", METHODS, ids=lambda method: "-".join(method.values())
+)
 
 
 def test_where_f_is_flaky_splitting_looks_once_and_a_miss_shows_nothing_yet(tmp_path):
@@ -88,7 +94,9 @@ def test_a_run_that_would_now_go_another_way_is_not_mixed_up(tmp_path, number):
         text = json.dumps(data | {"partitions": [[second, *rest], [first, *more], *others]})
         db.execute("UPDATE event SET data = ? WHERE id = ?", (text, id))
     for _ in range(2):
-        with pytest.raises(UserError, match=f"round {number} would now differ: the run was started with other"):
+        with pytest.raises(
+            UserError, match=f"round {number} would now differ: the run was started with other"
+        ):
             drive(path, FakePool(needs("wall", "beam"), 1))
 
 
@@ -115,7 +123,11 @@ def test_a_veto_of_what_was_known_teaches_a_resumed_run_nothing_else(tmp_path, m
     path = new_run(tmp_path, **method)
     learnt.clear()
     with pytest.raises(Killed):
-        drive(path, FakePool(oracle, 1), prepare=lambda file: _veto_in(file, again["round"], again["candidate"]))
+        drive(
+            path,
+            FakePool(oracle, 1),
+            prepare=lambda file: _veto_in(file, again["round"], again["candidate"]),
+        )
     first = list(learnt)
     assert state_of(path).refused
     learnt.clear()
@@ -153,7 +165,11 @@ def test_one_worker_makes_no_test_for_nothing(tmp_path):
 
 
 @every_method
-@given(salt=st.integers(0, 5), moments=st.lists(st.integers(1, 60), min_size=1, max_size=4), jobs=st.integers(1, 3))
+@given(
+    salt=st.integers(0, 5),
+    moments=st.lists(st.integers(1, 60), min_size=1, max_size=4),
+    jobs=st.integers(1, 3),
+)
 @examples(0.1)
 def test_killed_at_any_moment_it_resumes_to_the_same_end(method, salt, moments, jobs):
     with tempfile.TemporaryDirectory() as folder:
@@ -179,7 +195,9 @@ def test_a_robot_that_does_not_fail_ends_the_run(tmp_path):
 def test_the_failure_that_the_user_chose_is_reduced(tmp_path):
     def oracle(keep, seed):
         """The wall stops the robot, but in every third run the ball does so elsewhere, if it is there."""
-        return "other" if seed % 3 == 0 and "ball" in keep else "similar" if "wall" in keep else "pass"
+        return (
+            "other" if seed % 3 == 0 and "ball" in keep else "similar" if "wall" in keep else "pass"
+        )
 
     usual = drive(new_run(tmp_path, baseline_runs=5, iterations=2), FakePool(oracle, 2))
     rarer = drive(new_run(tmp_path, baseline_runs=5, iterations=2, failure=2), FakePool(oracle, 2))
@@ -200,7 +218,10 @@ def test_ask_mode_waits_and_a_rejected_candidate_is_left_alone(tmp_path):
         while True:
             state = yield from until(lambda state: state.waiting_candidate is not None)
             asked.append((state.round.number, state.waiting_candidate))
-            yield "accept" if asked[1:] else "reject", {"round": asked[-1][0], "candidate": asked[-1][1]}
+            yield (
+                "accept" if asked[1:] else "reject",
+                {"round": asked[-1][0], "candidate": asked[-1][1]},
+            )
 
     path = new_run(tmp_path)
     state = drive(path, Guided(path, needs("wall"), guide()), accept_mode="ask")
@@ -213,7 +234,9 @@ def test_ask_mode_waits_and_a_rejected_candidate_is_left_alone(tmp_path):
 def test_a_vetoed_candidate_is_not_run_and_the_end_is_not_called_minimal(tmp_path):
     def without_ball(state):
         candidates = () if state.round is None else state.round.candidates
-        return next((one for one in candidates if "ball" not in one.models and not one.verdict), None)
+        return next(
+            (one for one in candidates if "ball" not in one.models and not one.verdict), None
+        )
 
     def guide():
         while True:
@@ -248,7 +271,9 @@ def test_each_round_has_a_forecast_when_it_begins(tmp_path):
     path = new_run(tmp_path)
     assert drive(path, FakePool(needs("wall", "beam"), 2)).minimal
     forecasts = told(path, "forecast")
-    assert [each["round"] for each in forecasts] == [each["round"] for each in told(path, "round_started")]
+    assert [each["round"] for each in forecasts] == [
+        each["round"] for each in told(path, "round_started")
+    ]
     assert all(low <= likely <= high for low, likely, high in (each["tests"] for each in forecasts))
 
 

@@ -27,7 +27,13 @@ def chaotic(salt):
 
     def oracle(keep, seed):
         draw = crc32(f"{salt} {sorted(keep)} {seed}".encode()) % 10
-        return "similar" if draw < (6 if len(keep) == len(ELEMENTS) else 4) else "other" if draw < 6 else "pass"
+        return (
+            "similar"
+            if draw < (6 if len(keep) == len(ELEMENTS) else 4)
+            else "other"
+            if draw < 6
+            else "pass"
+        )
 
     return oracle
 
@@ -47,10 +53,14 @@ def chosen_seeds(state, most):
     algorithm=st.sampled_from(sorted(names("algorithm"))),
     jobs=st.integers(1, 4),
 )
-def test_the_end_fails_with_a_chosen_seed_and_with_none_without_any_one_model(salt, most, algorithm, jobs):
+def test_the_end_fails_with_a_chosen_seed_and_with_none_without_any_one_model(
+    salt, most, algorithm, jobs
+):
     oracle = chaotic(salt)
     with tempfile.TemporaryDirectory() as folder:
-        state = drive(exact_run(folder, exact_seeds=most, algorithm=algorithm), FakePool(oracle, jobs, salt))
+        state = drive(
+            exact_run(folder, exact_seeds=most, algorithm=algorithm), FakePool(oracle, jobs, salt)
+        )
     if state.baseline is None:
         return
     seeds, left = chosen_seeds(state, most), frozenset(state.environment)
@@ -69,10 +79,16 @@ def test_the_end_fails_with_a_chosen_seed_and_with_none_without_any_one_model(sa
     fresh = [test for test in state.tests if test.phase == CERTIFY]
     assert len(fresh) == end.runs == (1 if stands_for_all(state) else 20)
     assert end.shown == sum(oracle(left, test.seed) == "similar" for test in fresh)
-    assert not {test.seed for test in fresh} & {test.seed for test in state.tests if test.phase != CERTIFY}
+    assert not {test.seed for test in fresh} & {
+        test.seed for test in state.tests if test.phase != CERTIFY
+    }
 
 
-@given(salt=st.integers(0, 20), moments=st.lists(st.integers(1, 60), min_size=1, max_size=4), jobs=st.integers(1, 3))
+@given(
+    salt=st.integers(0, 20),
+    moments=st.lists(st.integers(1, 60), min_size=1, max_size=4),
+    jobs=st.integers(1, 3),
+)
 @examples(0.2)
 def test_killed_at_any_moment_and_with_any_workers_it_comes_to_the_same_end(salt, moments, jobs):
     with tempfile.TemporaryDirectory() as folder:
@@ -84,7 +100,9 @@ def test_killed_at_any_moment_and_with_any_workers_it_comes_to_the_same_end(salt
     assert story(state) == story(undisturbed)
 
 
-NEEDED = st.sets(st.sampled_from(MODELS), min_size=1, max_size=3).map(lambda names: tuple(sorted(names)))
+NEEDED = st.sets(st.sampled_from(MODELS), min_size=1, max_size=3).map(
+    lambda names: tuple(sorted(names))
+)
 
 
 @given(salt=st.integers(0, 99), needed=NEEDED, tenths=st.sampled_from([4, 7, 10]))
@@ -99,14 +117,18 @@ def test_slices_of_the_chosen_runs_save_tests_and_keep_the_promise(salt, needed,
     assert state.minimal
     assert state.refuted is None
     assert all(simulator.outcome(left, seed) == "similar" for seed in state.certificate.seeds)
-    assert not any(simulator.outcome(left - {name}, seed) == "similar" for name in left for seed in seeds)
+    assert not any(
+        simulator.outcome(left - {name}, seed) == "similar" for name in left for seed in seeds
+    )
 
 
 def test_a_simulator_that_does_not_repeat_is_refused(tmp_path):
     pool = FakePool(lambda keep, seed: "similar", 2)
     # Each run ends a hair to the side of the last one: within epsilon of f, but not the same.
     pool.aside = lambda keep, seed: 1e-9 * len(pool.made)
-    with pytest.raises(UserError, match=r"accept_rate: exact needs runs that repeat, but run 1 of the whole world"):
+    with pytest.raises(
+        UserError, match=r"accept_rate: exact needs runs that repeat, but run 1 of the whole world"
+    ):
         drive(exact_run(tmp_path), pool)
 
 
@@ -162,7 +184,11 @@ def test_it_can_be_chosen_during_a_run(tmp_path, monkeypatch, jobs):
 def test_it_is_offered_with_both_costs_where_f_is_rare_and_not_elsewhere(tmp_path):
     def notes(tenths):
         oracle = lambda keep, seed: "similar" if "wall" in keep and seed % 10 < tenths else "pass"  # noqa: E731
-        return dict(drive(new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(oracle, 1)).notes)
+        return dict(
+            drive(
+                new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(oracle, 1)
+            ).notes
+        )
 
     assert "rare" not in notes(7)
     words = notes(5)["rare"]
@@ -173,7 +199,11 @@ def test_it_is_offered_with_both_costs_where_f_is_rare_and_not_elsewhere(tmp_pat
 def test_the_price_of_a_certificate_of_a_rare_failure_is_said_before_it_begins(tmp_path):
     def notes(tenths):
         oracle = lambda keep, seed: "similar" if "wall" in keep and seed % 10 < tenths else "pass"  # noqa: E731
-        return dict(drive(new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(oracle, 1)).notes)
+        return dict(
+            drive(
+                new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(oracle, 1)
+            ).notes
+        )
 
     words = notes(2)["price"]
     assert words.startswith("f shows in 3 of ")
@@ -191,7 +221,9 @@ def test_where_all_runs_are_alike_one_run_of_them_is_reduced_with_the_search_alo
     searched = [test for test in state.tests if test.phase == "round"]
     assert len(pool.made) == 2 + len(searched) + 1 + 3
     assert state.minimal
-    assert state.reason.startswith("f shows with seed 0 each time; without any one of these 2 models it does not")
+    assert state.reason.startswith(
+        "f shows with seed 0 each time; without any one of these 2 models it does not"
+    )
     assert "; with other seeds f in 1 of 1 fresh run" in state.reason
     assert "alike to the last bit, so no more were made" in baseline(state)
 
@@ -199,7 +231,9 @@ def test_where_all_runs_are_alike_one_run_of_them_is_reduced_with_the_search_alo
 @pytest.mark.parametrize("what", ["the way", "what else moves", "the outcome"])
 def test_where_the_first_two_runs_differ_in_a_bit_all_runs_of_the_baseline_are_made(tmp_path, what):
     shows = needs("wall")
-    pool = FakePool(lambda keep, seed: "pass" if what == "the outcome" and seed == 1 else shows(keep, seed), 2)
+    pool = FakePool(
+        lambda keep, seed: "pass" if what == "the outcome" and seed == 1 else shows(keep, seed), 2
+    )
     if what == "the way":
         pool.aside = lambda keep, seed: 1e-12 * (seed == 1)
     if what == "what else moves":
@@ -227,7 +261,9 @@ def test_a_run_that_other_seeds_only_seemed_to_repeat_is_refused_at_the_end(tmp_
 
 
 @pytest.mark.parametrize("accept_rate", ["kept", "first"])
-def test_to_reduce_one_run_is_offered_with_both_costs_where_all_runs_are_alike_and_not_elsewhere(tmp_path, accept_rate):
+def test_to_reduce_one_run_is_offered_with_both_costs_where_all_runs_are_alike_and_not_elsewhere(
+    tmp_path, accept_rate
+):
     def notes(aside):
         pool = FakePool(needs("wall"), 1)
         pool.aside = lambda keep, seed: aside * seed

@@ -55,7 +55,11 @@ def fresh(state, gone):
     """The fresh runs without the models `gone`, counted from 0, and how they ended; by the last check."""
     first = state.isolated.asked.run + (len(state.isolated.checks) - 1) * state.isolated.asked.block
     for test in state.tests:
-        if test.removal is not None and test.run >= first and set(state.removals[test.removal - 1].models) == gone:
+        if (
+            test.removal is not None
+            and test.run >= first
+            and set(state.removals[test.removal - 1].models) == gone
+        ):
             yield test.run - first, test.outcome
 
 
@@ -75,12 +79,23 @@ def test_one_model_of_each_reason_goes_and_fresh_runs_show_what_that_is_worth(tm
     assert (back.verdict, back.reached) == ("needed", 0)
     assert back.high < first.low
     # The reduction is as it was.
-    same = ("status", "reason", "minimal", "environment", "certificates", "nodes", "evidence_test", "rounds_done")
+    same = (
+        "status",
+        "reason",
+        "minimal",
+        "environment",
+        "certificates",
+        "nodes",
+        "evidence_test",
+        "rounds_done",
+    )
     assert [getattr(state, name) for name in same] == [getattr(before, name) for name in same]
 
 
 @given(
-    groups=st.lists(st.sets(st.sampled_from(ELEMENTS), min_size=1, max_size=3), min_size=1, max_size=3),
+    groups=st.lists(
+        st.sets(st.sampled_from(ELEMENTS), min_size=1, max_size=3), min_size=1, max_size=3
+    ),
     jobs=st.integers(1, 3),
     salt=st.integers(0, 99),
 )
@@ -129,7 +144,10 @@ def test_what_only_the_seeds_of_the_search_let_pass_is_refuted_by_fresh_runs(tmp
     path = reduced(tmp_path, needs("wall", "beam"))
     state = work(path, FakePool(oracle, 2))
     assert removed(state) == {"beam"}
-    assert {claim.verdict for check in state.isolated.checks for claim in check.claims[:1]} <= {"passes", "fails"}
+    assert {claim.verdict for check in state.isolated.checks for claim in check.claims[:1]} <= {
+        "passes",
+        "fails",
+    }
 
 
 def test_where_nothing_lets_the_robot_pass_it_says_so(tmp_path):
@@ -186,7 +204,9 @@ def test_a_finished_run_implies_tests_here_too(tmp_path):
     drive(path, pool())
     state = work(path, pool())
     assert removed(state) == {"wall", "beam"}
-    implied = [test for test in state.tests if test.phase == ISOLATE and test.implied_by is not None]
+    implied = [
+        test for test in state.tests if test.phase == ISOLATE and test.implied_by is not None
+    ]
     assert implied
     for test in implied:
         keep = frozenset(ELEMENTS).difference(state.removals[test.removal - 1].models)
@@ -272,7 +292,9 @@ def test_a_model_that_fresh_runs_show_may_stay_is_put_back(tmp_path):
 
 
 @given(salt=st.integers(0, 10**6), most=st.integers(1, 4), jobs=st.integers(1, 3))
-def test_where_chosen_runs_are_reduced_they_pass_and_one_fails_with_any_one_model_put_back(salt, most, jobs):
+def test_where_chosen_runs_are_reduced_they_pass_and_one_fails_with_any_one_model_put_back(
+    salt, most, jobs
+):
     def oracle(keep, seed):
         draw = crc32(f"{salt} {sorted(keep)} {seed}".encode()) % 10
         return "pass" if not keep or draw < 4 else "similar"
@@ -284,7 +306,10 @@ def test_where_chosen_runs_are_reduced_they_pass_and_one_fails_with_any_one_mode
             return
         state = work(path, FakePool(oracle, jobs, salt))
     one, gone = state.isolated, removed(state)
-    passing, baseline = frozenset(ELEMENTS) - gone, [test for test in state.tests if test.phase == "baseline"]
+    passing, baseline = (
+        frozenset(ELEMENTS) - gone,
+        [test for test in state.tests if test.phase == "baseline"],
+    )
     seeds = [test.seed for test in baseline if test.run in one.asked.chosen]
     assert len(seeds) == len(one.asked.chosen) <= most
     assert all(oracle(frozenset(ELEMENTS), seed) == "similar" for seed in seeds)

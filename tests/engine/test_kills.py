@@ -56,7 +56,11 @@ def children(pid: int) -> list[int]:
 def workers(engine: int) -> list[int]:
     found = []
     with suppress(OSError):
-        found += [pid for pid in children(engine) if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+        found += [
+            pid
+            for pid in children(engine)
+            if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
+        ]
     return found
 
 
@@ -89,7 +93,10 @@ def lives(run: Path, dice: random.Random, most: int) -> int:
 
 def what_became(run: Path):
     state = state_of(run)
-    verdicts = [(data["round"], data["candidate"], data["verdict"]) for data in told(run, "candidate_judged")]
+    verdicts = [
+        (data["round"], data["candidate"], data["verdict"])
+        for data in told(run, "candidate_judged")
+    ]
     sound = [test for test in state.finished_tests if test.outcome not in BROKEN]
     made = Counter((models_in(state, test.id), test.run) for test in sound)
     assert set(made.values()) == {1}, "a finished test was made again"

@@ -63,7 +63,13 @@ def test_the_library_and_the_engine_test_the_same_models_in_the_same_order(
     salt, needed, tenths, algorithm, pair, accept, growth
 ):
     ours, theirs = (Oracle(salt, needed, tenths) for _ in range(2))
-    more = {"iterations": 3, "keep_rate": 0.8, "baseline_runs": 10, "growth": growth, "skip": "implied"}
+    more = {
+        "iterations": 3,
+        "keep_rate": 0.8,
+        "baseline_runs": 10,
+        "growth": growth,
+        "skip": "implied",
+    }
     partitioning, prioritization = pair.split("/")
     try:
         found = ddenv.reduce(
@@ -82,7 +88,9 @@ def test_the_library_and_the_engine_test_the_same_models_in_the_same_order(
         # Without seeds runs are made in blocks, and claims may begin anew with later numbers.
         patch.setattr("ddenv.evidence.claims.Terms", partial(Terms, order_seed=0))
         patch.setattr("ddenv.engine.journal.FRESH_RUNS", EACH_CERTIFICATE)
-        path = new_run(Path(folder), algorithm=algorithm, pair=pair, accept_rate=accept, slice=False, **more)
+        path = new_run(
+            Path(folder), algorithm=algorithm, pair=pair, accept_rate=accept, slice=False, **more
+        )
         pool = FakePool(lambda keep, _: "similar" if theirs.shows(keep) else "pass", 1)
         state = drive(path, pool)
     if found is None:
@@ -95,5 +103,10 @@ def test_the_library_and_the_engine_test_the_same_models_in_the_same_order(
     if accept == "kept":
         assert len(theirs.made) == length
         assert state.minimal == found.minimal
-        claims = [(claim.without, claim.verdict, claim.shown, claim.runs) for claim in state.certificate.claims]
-        assert claims == [(claim.without, claim.verdict, claim.shown, claim.runs) for claim in found.claims]
+        claims = [
+            (claim.without, claim.verdict, claim.shown, claim.runs)
+            for claim in state.certificate.claims
+        ]
+        assert claims == [
+            (claim.without, claim.verdict, claim.shown, claim.runs) for claim in found.claims
+        ]

@@ -77,7 +77,9 @@ def test_workers_that_die_before_they_run_a_test_end_the_engine_with_the_reason(
     pool = Pool(*parts(), 1, dies_at_once)
     try:
         pool.submit(1, Run(keep=EVERYTHING, seed=0))
-        with pytest.raises(UserError, match=r"die before they run a test: .*SIGKILL, perhaps out of memory"):
+        with pytest.raises(
+            UserError, match=r"die before they run a test: .*SIGKILL, perhaps out of memory"
+        ):
             result(pool)
     finally:
         pool.close()
@@ -100,9 +102,14 @@ def test_a_sub_environment_that_kills_its_worker_twice_is_unknown(tmp_path):
     times = Counter((models_in(state, test.id), test.run) for test in broke)
     assert set(times.values()) <= {1, 2}
     decisive = {
-        test for data in told(path, "candidate_judged") if data["verdict"] == "unknown" for test in data["tests"]
+        test
+        for data in told(path, "candidate_judged")
+        if data["verdict"] == "unknown"
+        for test in data["tests"]
     }
-    assert {times[models_in(state, test.id), test.run] for test in broke if test.id in decisive} == {2}
+    assert {
+        times[models_in(state, test.id), test.run] for test in broke if test.id in decisive
+    } == {2}
     assert {"wall", "beam"} <= set(state.environment) and not state.minimal
 
 
@@ -125,11 +132,16 @@ class Timed(FakePool):
 
     def finished(self, seconds):
         ended = super().finished(seconds)
-        return [(test, replace(each, wall_seconds=self.real * each.simulated_seconds)) for test, each in ended]
+        return [
+            (test, replace(each, wall_seconds=self.real * each.simulated_seconds))
+            for test, each in ended
+        ]
 
 
 @pytest.mark.parametrize(("real", "later"), [(0.1, LEAST), (30.0, FACTOR * 30 * TIMEOUT)])
-def test_the_baseline_has_a_long_time_and_later_tests_a_multiple_of_what_it_took(tmp_path, real, later):
+def test_the_baseline_has_a_long_time_and_later_tests_a_multiple_of_what_it_took(
+    tmp_path, real, later
+):
     assert f"{GENEROUS:g} in the baseline" in SETTINGS["wall_timeout"].meaning
     path = new_run(tmp_path)
     with suppress(Killed):
@@ -142,7 +154,9 @@ def test_the_baseline_has_a_long_time_and_later_tests_a_multiple_of_what_it_took
 
 
 def test_how_long_tests_take_changes_no_verdict(tmp_path):
-    assert story(drive(new_run(tmp_path), Timed(0.01))) == story(drive(new_run(tmp_path), Timed(1000.0)))
+    assert story(drive(new_run(tmp_path), Timed(0.01))) == story(
+        drive(new_run(tmp_path), Timed(1000.0))
+    )
 
 
 def test_a_number_of_the_users_holds_for_all_tests(tmp_path):
@@ -176,7 +190,9 @@ def test_a_slow_world_is_told_once_while_its_first_run_goes_on(tmp_path):
 
 
 @pytest.mark.parametrize(("simulated", "real"), [(11.0, 10.0), (0.5, KNOWN_AFTER - 0.1)])
-def test_a_fast_world_is_not_called_slow_and_one_that_has_just_begun_neither(tmp_path, simulated, real):
+def test_a_fast_world_is_not_called_slow_and_one_that_has_just_begun_neither(
+    tmp_path, simulated, real
+):
     path, pool = new_run(tmp_path), FakePool(needs("wall"), 2)
     pool.pace = [pace(simulated, real)]
     assert set(dict(drive(path, pool).notes)) == {"alike"}
@@ -192,7 +208,8 @@ def test_a_world_whose_runs_all_take_too_long_is_given_up_soon(tmp_path):
 
     path, pool = new_run(tmp_path, baseline_runs=10), Late(needs("wall"), 1)
     with pytest.raises(
-        UserError, match=r"3 runs of the whole world took longer than 1800 s .*, and none has ended; try fewer"
+        UserError,
+        match=r"3 runs of the whole world took longer than 1800 s .*, and none has ended; try fewer",
     ):
         drive(path, pool)
     assert len(pool.made) == MOST_LATE
@@ -215,7 +232,9 @@ def test_engines_that_die_before_a_test_ends_are_told_with_the_way_on(tmp_path):
         dies(path, after)
     check(path)
     dies(path, 1)
-    with pytest.raises(UserError, match=rf"the last {MOST_DEATHS} engines died after event 1, .* --anyway") as told:
+    with pytest.raises(
+        UserError, match=rf"the last {MOST_DEATHS} engines died after event 1, .* --anyway"
+    ) as told:
         check(path)
     assert "\n" not in str(told.value)
     # Nothing was written: it stays so.

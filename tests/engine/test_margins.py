@@ -80,14 +80,27 @@ def test_what_is_found_of_a_number_and_the_nearest_fix(path):
     assert (fix.name, fix.reached, fix.runs, fix.confirmed) == ("wall.y", FIX_RUNS, FIX_RUNS, True)
     assert fix.value == wall.up.goal.value
     # The reduction is as it was, and no seed of the fix was seen by the search.
-    same = ("status", "reason", "minimal", "environment", "certificates", "nodes", "tests", "rounds_done")
+    same = (
+        "status",
+        "reason",
+        "minimal",
+        "environment",
+        "certificates",
+        "nodes",
+        "tests",
+        "rounds_done",
+    )
     assert [getattr(state, name) for name in same] == [getattr(before, name) for name in same]
     searched = {one.seed for one in state.margins.runs if one.run < 1_000}
     assert len({one.seed for one in state.margins.runs} - searched) == FIX_RUNS
 
 
-@pytest.mark.parametrize("engines", slow(pytest.mark.rates, [(1, [6] * 10), (5, [7, 7, 30])], but=[(5, [7, 7, 30])]))
-def test_whoever_works_on_it_and_however_often_it_is_killed_the_table_is_the_same(path, tmp_path, engines):
+@pytest.mark.parametrize(
+    "engines", slow(pytest.mark.rates, [(1, [6] * 10), (5, [7, 7, 30])], but=[(5, [7, 7, 30])])
+)
+def test_whoever_works_on_it_and_however_often_it_is_killed_the_table_is_the_same(
+    path, tmp_path, engines
+):
     jobs, moments = engines
     (tmp_path / "again").mkdir()
     other = new_run(tmp_path / "again")
@@ -95,7 +108,9 @@ def test_whoever_works_on_it_and_however_often_it_is_killed_the_table_is_the_sam
     once = work(path, fake(2))
     for after in moments:
         with suppress(Killed):
-            work(other, fake(jobs, after), prepare=lambda file, after=after: kill_after(file, after))
+            work(
+                other, fake(jobs, after), prepare=lambda file, after=after: kill_after(file, after)
+            )
     assert state_of(other).margining is not None
     again = work(other, fake(jobs, 3), globs=None)
     assert table(again) == table(once)
@@ -138,7 +153,11 @@ def test_a_stop_keeps_all_and_the_run_is_as_it_was(path):
         file.own()
         Journal(file).record(EngineStopped(reason="stopped by the user"))
     state = state_of(path)
-    assert (state.status, state.reason, state.minimal) == (before.status, before.reason, before.minimal)
+    assert (state.status, state.reason, state.minimal) == (
+        before.status,
+        before.reason,
+        before.minimal,
+    )
     assert len(state.margining.runs) >= 8
     assert table(work(path, fake(), globs=None)) == table(work(path, fake()))
 
@@ -232,7 +251,11 @@ def test_what_is_wrong_is_said_in_one_line(path):
     state = state_of(path)
     assert (state.status, state.reason, state.margining) == (before.status, before.reason, None)
     assert not [
-        value for one in margins_of(state.margins) for side in one.sides for value in side.tried if value.verdict == "f"
+        value
+        for one in margins_of(state.margins)
+        for side in one.sides
+        for value in side.tried
+        if value.verdict == "f"
     ]
     with pytest.raises(UserError, match=r"there is no number 'wal\.y' \(did you mean wall\.y\?\)"):
         work(path, fake(), globs=["wal.y"])
@@ -249,8 +272,14 @@ def test_a_run_with_another_value_has_the_bits_of_the_world_that_is_exported(tmp
     files = tmp_path / "fixed.sdf", tmp_path / "fixed.yaml"
     export_world(run, *files, margins=("wall.y=0.25",))
     fixed = load_scenario(files[1])
-    with closing(Pool(scenario, world, robot, 1)) as pool, closing(Pool(fixed, *load_parts(fixed), 1)) as other:
-        own = [simulated(pool, keep, changes) for changes in ((), (("wall.y", 0.25),), (("wall.y", 2.0),), ())]
+    with (
+        closing(Pool(scenario, world, robot, 1)) as pool,
+        closing(Pool(fixed, *load_parts(fixed), 1)) as other,
+    ):
+        own = [
+            simulated(pool, keep, changes)
+            for changes in ((), (("wall.y", 0.25),), (("wall.y", 2.0),), ())
+        ]
         exported = simulated(other, keep, ())
     assert np.array_equal(own[1], exported)
     assert np.array_equal(own[0], own[3])

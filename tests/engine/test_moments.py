@@ -35,7 +35,10 @@ def test_what_is_tried_by_hand_goes_before_the_search(tmp_path):
         after = yield from until(lambda state: state.trials[0].verdict)
         assert after.tests_done - before.tests_done <= 2
 
-    assert guided(new_run(tmp_path, iterations=3), flaky(1, "wall", "beam"), guide()).trials[0].verdict == "similar"
+    assert (
+        guided(new_run(tmp_path, iterations=3), flaky(1, "wall", "beam"), guide()).trials[0].verdict
+        == "similar"
+    )
 
 
 @pytest.mark.parametrize("refused", ["vetoed", "rejected"])
@@ -90,7 +93,11 @@ def test_what_is_accepted_is_taken_before_the_next_decision(tmp_path):
         yield "accept_mode", {"mode": "automatic"}
 
     state = guided(path, needs("wall"), guide())
-    assert (state.nodes[1].how, state.nodes[1].rejected, state.nodes[2].parent) == ("reduced", True, 0)
+    assert (state.nodes[1].how, state.nodes[1].rejected, state.nodes[2].parent) == (
+        "reduced",
+        True,
+        0,
+    )
 
 
 def test_a_pinned_model_that_was_not_there_yet_is_unpinned_by_undo(tmp_path):
@@ -143,7 +150,10 @@ def test_a_trial_is_not_adopted_where_its_failure_does_not_count(tmp_path):
     def guide():
         state = yield from until(lambda state: any(test.outcome == "other" for test in state.tests))
         yield "pause", {}
-        yield "accept_other", {"test": next(test.id for test in state.tests if test.outcome == "other")}
+        yield (
+            "accept_other",
+            {"test": next(test.id for test in state.tests if test.outcome == "other")},
+        )
         yield "try", {"models": numbers("wall", "ball")}
         yield from until(lambda state: state.trials and state.trials[0].verdict == "similar")
         yield "undo", {}
@@ -181,7 +191,10 @@ def test_trials_keep_to_the_budget(tmp_path):
 
 
 def test_with_more_budget_the_search_goes_on_as_it_was(tmp_path):
-    path, undisturbed = new_run(tmp_path, budget=6, pair="learner/timestep"), new_run(tmp_path, pair="learner/timestep")
+    path, undisturbed = (
+        new_run(tmp_path, budget=6, pair="learner/timestep"),
+        new_run(tmp_path, pair="learner/timestep"),
+    )
     with pytest.raises(Stopped, match="the budget of 6 tests is used up"):
         drive(path, FakePool(needs("wall", "beam"), 1))
     assert state_of(path).tests_done == 6
@@ -212,7 +225,11 @@ def test_a_decision_counts_once_whenever_the_engine_is_killed(tmp_path):
         drive(path, FakePool(needs("wall"), 1))
         send(path, "undo")
         with pytest.raises(Killed):
-            drive(path, FakePool(needs("wall"), 1), prepare=lambda file, after=after: kill_after(file, after))
+            drive(
+                path,
+                FakePool(needs("wall"), 1),
+                prepare=lambda file, after=after: kill_after(file, after),
+            )
         state = drive(path, FakePool(needs("wall"), 1))
         assert [one.kind for one in state.decisions] == ["undo"]
         assert state.status == "finished" and "wall" in state.environment

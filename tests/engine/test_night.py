@@ -73,10 +73,15 @@ def test_no_test_starts_on_a_disk_that_is_nearly_full_and_the_run_goes_on_when_t
     lines, kinds = lines_and_kinds(path)
     first, last = (number for number, kind in enumerate(kinds) if kind == "disk_space")
     assert "test_started" not in kinds[first:last] and "test_started" in kinds[:first]
-    assert "out of disk space: waiting until 32 MB are free" in lines and "there is disk space again" in lines
+    assert (
+        "out of disk space: waiting until 32 MB are free" in lines
+        and "there is disk space again" in lines
+    )
 
 
-def test_a_result_that_finds_no_room_waits_and_nothing_is_half_written(tmp_path, monkeypatch, capsys, undisturbed):
+def test_a_result_that_finds_no_room_waits_and_nothing_is_half_written(
+    tmp_path, monkeypatch, capsys, undisturbed
+):
     path = new_run(tmp_path)
     looks = []
     original = RunFile.append
@@ -133,15 +138,28 @@ def test_a_clock_that_jumps_is_told_and_its_time_does_not_count(tmp_path, monkey
         monkeypatch.setattr(time, "time", lambda: now[0] + now[1])
         monkeypatch.setattr(time, "monotonic", lambda: now[1])
         engine = Control(journal, threading.Event())
-        for jump, passed in ((0.1, 0.1), (-1.0, 600.0), (8 * 3600.0, 0.1), (0.0, 0.1), (-3 * 86400.0, 0.1)):
+        for jump, passed in (
+            (0.1, 0.1),
+            (-1.0, 600.0),
+            (8 * 3600.0, 0.1),
+            (0.0, 0.1),
+            (-3 * 86400.0, 0.1),
+        ):
             now[0], now[1] = now[0] + jump, now[1] + passed
             engine.poll()
         monkeypatch.undo()
-    assert [data["seconds"] for data in told(path, "clock_jumped")] == pytest.approx([8 * 3600.0, -3 * 86400.0])
-    assert "the machine slept, or its clock was set: that time does not count" in lines_and_kinds(path)[0]
+    assert [data["seconds"] for data in told(path, "clock_jumped")] == pytest.approx(
+        [8 * 3600.0, -3 * 86400.0]
+    )
+    assert (
+        "the machine slept, or its clock was set: that time does not count"
+        in lines_and_kinds(path)[0]
+    )
 
 
-def test_a_stop_for_an_earlier_engine_stops_no_later_one_although_the_clock_was_set_back(tmp_path, monkeypatch):
+def test_a_stop_for_an_earlier_engine_stops_no_later_one_although_the_clock_was_set_back(
+    tmp_path, monkeypatch
+):
     path = new_run(tmp_path)
     with RunFile(path) as file:
         monkeypatch.setattr(time, "time", lambda: 4e9)
@@ -167,12 +185,16 @@ def test_an_engine_whose_run_file_is_gone_says_so_and_touches_no_other(tmp_path,
         def counted(*values):
             count[0] += 1
             if count[0] == 12:
-                {"deleted": path.unlink, "moved": lambda: path.rename(moved)}.get(fate, lambda: other.replace(path))()
+                {"deleted": path.unlink, "moved": lambda: path.rename(moved)}.get(
+                    fate, lambda: other.replace(path)
+                )()
             return append(*values)
 
         file.append = counted
 
-    with pytest.raises(UserError, match=f"{path}: the run file was .*{fate}.* while an engine worked on it"):
+    with pytest.raises(
+        UserError, match=f"{path}: the run file was .*{fate}.* while an engine worked on it"
+    ):
         drive(path, FakePool(oracle, 2), prepare=disturb)
     assert path.exists() == (fate == "replaced by another file")
     assert not any(path.with_name(path.name + ending).exists() for ending in LOGS)
@@ -220,7 +242,9 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("call", "number", "words"), REFUSED.values(), ids=REFUSED)
-def test_a_folder_in_which_no_engine_can_work_is_told_in_one_line(tmp_path, monkeypatch, call, number, words):
+def test_a_folder_in_which_no_engine_can_work_is_told_in_one_line(
+    tmp_path, monkeypatch, call, number, words
+):
     path = new_run(tmp_path)
 
     def refuse(*_):

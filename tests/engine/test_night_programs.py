@@ -20,7 +20,10 @@ from tests.wall import wall
 LIMIT = 8.0
 # What a file may still grow by, bytes.
 LEFT = 65_536
-pytestmark = [pytest.mark.programs, pytest.mark.skipif(sys.platform != "linux", reason="needs Linux's prlimit")]
+pytestmark = [
+    pytest.mark.programs,
+    pytest.mark.skipif(sys.platform != "linux", reason="needs Linux's prlimit"),
+]
 
 
 @pytest.fixture
@@ -62,7 +65,10 @@ def test_a_file_that_may_not_grow_stops_no_reduction(path, engine):
     wait_until(lambda: state_of(path).tests_done >= 1, log.read_text)
     limit_files(engine, path.stat().st_size)
     # What may not be written waits, and is not said of the disk.
-    wait_until(lambda: "waits until the limit of a file's size (ulimit -f) is raised" in log.read_text(), log.read_text)
+    wait_until(
+        lambda: "waits until the limit of a file's size (ulimit -f) is raised" in log.read_text(),
+        log.read_text,
+    )
     assert "MB are free" not in log.read_text()
     before = state_of(path).tests_done
     assert engine.poll() is None

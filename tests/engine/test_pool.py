@@ -141,11 +141,17 @@ def test_a_test_that_takes_too_long_is_killed_and_the_next_one_works(tmp_path):
     (tmp_path / "waits.py").write_text(WAITS.replace("FOLDER", str(tmp_path)))
     scenario, world, robot = parts(wall_timeout=0.5)
     waits = scenario.controller.model_copy(update={"use": "waits:Waits", "answer_within": 1e6})
-    pool = Pool(scenario.model_copy(update={"controller": waits, "folder": tmp_path}), world, robot, 1)
+    pool = Pool(
+        scenario.model_copy(update={"controller": waits, "folder": tmp_path}), world, robot, 1
+    )
     try:
         pool.submit(1, Run(keep=EVERYTHING, seed=0))
         test, late = result(pool)
-        assert (test, late.outcome, late.failure) == (1, "timeout", "took longer than 0.5 s of wall clock")
+        assert (test, late.outcome, late.failure) == (
+            1,
+            "timeout",
+            "took longer than 0.5 s of wall clock",
+        )
         (tmp_path / "go").touch()
         pool.submit(2, Run(keep=EVERYTHING, seed=0, limit=1e6))
         assert (result(pool)[1].outcome, pool.idle) == ("failed", 1)
@@ -197,7 +203,9 @@ def test_only_the_time_counts_in_which_the_robot_moves(monkeypatch):
     # The engine is stopped for a day.
     assert clock.looks(86400, every=86400) == []
     assert clock.looks(28, every=0.5) == []
-    assert clock.looks(2, every=0.5) == [(1, Broken("timeout", "took longer than 60 s of wall clock"))]
+    assert clock.looks(2, every=0.5) == [
+        (1, Broken("timeout", "took longer than 60 s of wall clock"))
+    ]
     assert Silent.killed == 1
     assert pool.idle == 1
     # Nothing of its time counts for the next one; and what never begins ends, too.
@@ -213,7 +221,9 @@ def test_progress_is_seen_while_a_test_runs(pool):
     while not (ended := pool.finished(0.005)):
         seen += pool.live()
     assert ended[0][0] == 7
-    assert all(live.test == 7 and math.isfinite(live.time) and 0.0 <= real < 60.0 for live, real in seen)
+    assert all(
+        live.test == 7 and math.isfinite(live.time) and 0.0 <= real < 60.0 for live, real in seen
+    )
     assert pool.live() == []
 
 
@@ -224,7 +234,9 @@ def test_a_worker_finds_what_rests_on_what(tmp_path):
     # The ball lies on the deck, and can move.
     fixed = text[text.index('<model name="ball">') : text.index('<model name="beam">')]
     inertial = "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>"
-    free = fixed.replace("<static>true</static>", "").replace("<collision", f"{inertial}<collision", 1)
+    free = fixed.replace("<static>true</static>", "").replace(
+        "<collision", f"{inertial}<collision", 1
+    )
     path = tmp_path / "world.sdf"
     path.write_text(text.replace(fixed, free.replace("4 4 0.3", "0 0.8 0.6")))
     pool = Pool(scenario, read_world(path), robot, 1)
@@ -232,7 +244,9 @@ def test_a_worker_finds_what_rests_on_what(tmp_path):
         found = pool.settle(frozenset(world.elements()))
         assert pool.idle == 0
         known = []
-        wait_until(lambda: known.append(found()) or known[-1] is not None, lambda: "it was not found")
+        wait_until(
+            lambda: known.append(found()) or known[-1] is not None, lambda: "it was not found"
+        )
         assert known[-1].supports == [("ball", "deck")]
         # The worker is free again.
         pool.submit(1, Run(keep=EVERYTHING, seed=0))
@@ -244,7 +258,9 @@ def test_a_worker_finds_what_rests_on_what(tmp_path):
 @pytest.mark.programs
 def test_a_world_that_cannot_be_simulated_is_told():
     scenario, world, robot = parts()
-    legless = robot.__class__(robot.name, robot.pose, robot.static, robot.links, (), robot.spans, robot.line)
+    legless = robot.__class__(
+        robot.name, robot.pose, robot.static, robot.links, (), robot.spans, robot.line
+    )
     pool = Pool(scenario, world, legless, 1)
     try:
         pool.submit(1, Run(keep=EVERYTHING, seed=0))

@@ -40,7 +40,9 @@ def resumed(path, kill=True, **options):
 
 
 def another_drake(monkeypatch):
-    monkeypatch.setattr(processor, "versions", lambda *names: ", ".join(f"{name} 0.9" for name in names))
+    monkeypatch.setattr(
+        processor, "versions", lambda *names: ", ".join(f"{name} 0.9" for name in names)
+    )
 
 
 def other_bits(monkeypatch):
@@ -82,7 +84,9 @@ def test_with_other_bits_no_test_is_made_until_the_user_has_chosen(begun, monkey
             UserError, match=r"gives a different trajectory: the tests were made with ddenv .*drake"
         ) as refused:
             resumed(begun)
-        assert f"'ddenv resume {begun} --mixed'" in str(refused.value) and "\n" not in str(refused.value)
+        assert f"'ddenv resume {begun} --mixed'" in str(refused.value) and "\n" not in str(
+            refused.value
+        )
         assert ", drake 0.9, numpy 0.9, scipy 0.9, Python" in str(refused.value)
     assert [test.outcome for test in state_of(begun).tests if test.is_finished] == [
         test.outcome for test in before if test.is_finished
@@ -149,7 +153,9 @@ def test_the_command_offers_to_go_on_or_to_make_all_tests_again(home):
     assert "different bits: from here on the tests are mixed" in mixed.stdout
     refused = ddenv("resume", run, "--timeout", 7)
     assert refused.returncode == 2 and refused.stderr.count("\n") == 1
-    assert f"'ddenv resume {run} --again --timeout 7' makes all tests in a new run" in refused.stderr
+    assert (
+        f"'ddenv resume {run} --again --timeout 7' makes all tests in a new run" in refused.stderr
+    )
     again = ddenv("resume", run, "--again", "--timeout", 7)
     assert "wall-2.ddenv" in again.stderr and again.returncode == 1
     state = state_of(home / "runs" / "wall-2.ddenv")

@@ -28,7 +28,9 @@ def test_a_simulator_with_poor_random_numbers_shows_its_rate(tmp_path):
 
 
 def test_another_base_has_other_seeds():
-    of_zero, of_one = ({seed_of(Reduction(seed=base), run) for run in range(12_000)} for base in (0, 1))
+    of_zero, of_one = (
+        {seed_of(Reduction(seed=base), run) for run in range(12_000)} for base in (0, 1)
+    )
     assert min(len(of_zero), len(of_one)) >= 11_998
     assert len(of_zero & of_one) <= 2
     assert max(of_zero | of_one) < 2**31

@@ -37,7 +37,9 @@ def world(tmp_path_factory):
     assert static in after
     inertial = "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>"
     path = tmp_path_factory.mktemp("world") / "moving.sdf"
-    free = after.replace(static, f'<pose>4 4 0.3 0 0 0</pose>\n      <link name="link">{inertial}', 1)
+    free = after.replace(
+        static, f'<pose>4 4 0.3 0 0 0</pose>\n      <link name="link">{inertial}', 1
+    )
     path.write_text(f'{before}<model name="ball">{free}')
     return path
 
@@ -51,7 +53,9 @@ def pool(oracle, jobs=2, seed=0, supports=PAIRS):
 def test_what_is_wrong_with_the_start_is_told_once_each_before_the_first_test(tmp_path, world):
     path = new_run(tmp_path, world=world, budget=1)
     made = pool(needs("wall"))
-    made.settled = Settled(seconds=3.0, places={"ball": (Pose((4.0, 4.0, 1.3)),)}, restless=("ball",))
+    made.settled = Settled(
+        seconds=3.0, places={"ball": (Pose((4.0, 4.0, 1.3)),)}, restless=("ball",)
+    )
     # The engine is killed after the first line.
     with pytest.raises(Killed):
         drive(path, made, prepare=lambda file: kill_after(file, 1))
@@ -70,7 +74,9 @@ def test_what_the_files_show_of_the_start_is_noted(tmp_path, world):
         scenario, seen, robot = read_parts(file)
         journal = Journal(file)
         high = scenario.robot.spawn.model_copy(update={"z": 3.0})
-        scenario = scenario.model_copy(update={"robot": scenario.robot.model_copy(update={"spawn": high})})
+        scenario = scenario.model_copy(
+            update={"robot": scenario.robot.model_copy(update={"spawn": high})}
+        )
         for _ in range(2):
             note_start(scenario, seen, robot, journal)
         assert [about for about, _ in journal.state.notes] == ["drop"]
@@ -118,9 +124,12 @@ def test_what_cannot_be_found_is_said_and_stops_only_who_needs_it(tmp_path, worl
     assert state.minimal
     assert (state.supports, state.unsettled) == ((), broken.failure)
     with pytest.raises(
-        UserError, match=r"keep_supports: it is not known which models rest on which: took longer than 1 s"
+        UserError,
+        match=r"keep_supports: it is not known which models rest on which: took longer than 1 s",
     ):
-        drive(new_run(tmp_path, world=world, keep_supports=True), pool(needs("wall"), supports=broken))
+        drive(
+            new_run(tmp_path, world=world, keep_supports=True), pool(needs("wall"), supports=broken)
+        )
 
 
 def test_another_simulator_does_not_know_it(tmp_path, world):
@@ -132,7 +141,9 @@ def test_another_simulator_does_not_know_it(tmp_path, world):
         drive(path, pool(needs("wall")))
 
 
-@pytest.mark.parametrize("method", [{}, {"algorithm": "splitting"}, {"pair": "learner/timestep"}], ids=str)
+@pytest.mark.parametrize(
+    "method", [{}, {"algorithm": "splitting"}, {"pair": "learner/timestep"}], ids=str
+)
 def test_stacks_stay_whole_in_all_tests_of_a_run(tmp_path, world, method):
     asked = {"keep_supports": True, "accept_rate": "kept", **method}
     made = pool(needs("wall", "ball"))
@@ -145,7 +156,9 @@ def test_stacks_stay_whole_in_all_tests_of_a_run(tmp_path, world, method):
         assert all(keep.issuperset(stack) or keep.isdisjoint(stack) for keep, _ in made.made)
     # A stack is left out as a whole in the certificate, too.
     assert set(claims(state)) == {None, "wall", "post"}
-    assert (frozenset({"wall"}) in {keep for keep, _ in made.made}) and claims(state)["post"].verdict == "needed"
+    assert (frozenset({"wall"}) in {keep for keep, _ in made.made}) and claims(state)[
+        "post"
+    ].verdict == "needed"
 
 
 def test_a_pinned_model_holds_its_whole_stack(tmp_path, world):

@@ -73,7 +73,11 @@ def test_another_method_comes_to_the_same_as_alone(tmp_path, made, jobs):
     found = known(path)
     state = share(path, pool := FakePool(needs("wall", "beam"), jobs), found)
     alone = drive(new_run(tmp_path, **method), FakePool(needs("wall", "beam"), 1))
-    assert (state.environment, state.minimal, state.rounds_done) == (alone.environment, True, alone.rounds_done)
+    assert (state.environment, state.minimal, state.rounds_done) == (
+        alone.environment,
+        True,
+        alone.rounds_done,
+    )
     taken = sum(test.taken for test in state.tests)
     assert taken >= 3 and taken + len(pool.made) == state.tests_done
 
@@ -89,7 +93,12 @@ def test_tests_of_other_seeds_are_made(tmp_path, made):
 
 def test_how_a_world_is_reduced_does_not_matter_nor_where_files_are(tmp_path, made):
     (tmp_path / "wall.sdf").write_bytes((DATA / "wall.sdf").read_bytes())
-    moved = {"name": "other", "description": "other", "world": tmp_path / "wall.sdf", "folder": tmp_path}
+    moved = {
+        "name": "other",
+        "description": "other",
+        "world": tmp_path / "wall.sdf",
+        "folder": tmp_path,
+    }
     assert known(changed_run(tmp_path, moved))
 
 
@@ -150,7 +159,9 @@ def test_of_another_simulator_nothing_is_taken_over(made, fresh, monkeypatch):
     assert known(fresh)
     # One that was begun with another version may hold tests of that one.
     with sqlite3.connect(made) as db:
-        data = json.dumps({"pid": 1, "jobs": 1, "version": "0", "simulator": "drake 0.1, numpy 0.1"})
+        data = json.dumps(
+            {"pid": 1, "jobs": 1, "version": "0", "simulator": "drake 0.1, numpy 0.1"}
+        )
         db.execute("INSERT INTO event (time, kind, data) VALUES (0, 'engine_started', ?)", (data,))
     assert known(fresh) == {}
 
@@ -163,7 +174,12 @@ def test_no_other_run_takes_what_was_ended_early(tmp_path):
     path = new_run(tmp_path, early_stop=True, **METHOD)
     whole, left = frozenset(first.elements), frozenset(first.environment)
     accepted = {frozenset(node.environment) for node in first.nodes}
-    assert {models for models, _ in known(path)} == {whole, left, left - {"wall"}, left - {"beam"}} | accepted
+    assert {models for models, _ in known(path)} == {
+        whole,
+        left,
+        left - {"wall"},
+        left - {"beam"},
+    } | accepted
     assert not any(place.test.cut for place in known(path).values())
     state = share(path, pool := FakePool(oracle, 1, **cut))
     assert state.minimal and set(state.environment) == left
@@ -179,7 +195,10 @@ def test_broken_tests_are_made_again(tmp_path):
     # Some break after they have moved.
     with sqlite3.connect(path) as db:
         for test in broken.tests:
-            db.execute("INSERT OR IGNORE INTO motion SELECT ?, model, samples FROM motion WHERE test = 1", (test.id,))
+            db.execute(
+                "INSERT OR IGNORE INTO motion SELECT ?, model, samples FROM motion WHERE test = 1",
+                (test.id,),
+            )
     found = known(path := new_run(tmp_path, algorithm="ddmin"))
     assert {place.test.outcome for place in found.values()} == {"pass", "similar"}
     share(path, pool := FakePool(needs("wall"), 1), found)

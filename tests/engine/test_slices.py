@@ -18,10 +18,16 @@ from tests.engine.reading import events, models_in, state_of
 from tests.engine.test_repeating import another_drake
 from tests.tiers import examples
 
-NEEDED = st.sets(st.sampled_from(MODELS), min_size=1, max_size=3).map(lambda names: tuple(sorted(names)))
-TIES = st.lists(st.tuples(*2 * [st.sampled_from(MODELS)]).filter(lambda tie: tie[0] != tie[1]), max_size=5).map(tuple)
+NEEDED = st.sets(st.sampled_from(MODELS), min_size=1, max_size=3).map(
+    lambda names: tuple(sorted(names))
+)
+TIES = st.lists(
+    st.tuples(*2 * [st.sampled_from(MODELS)]).filter(lambda tie: tie[0] != tie[1]), max_size=5
+).map(tuple)
 SIMULATORS = st.builds(Participation, salt=st.integers(0, 99), needed=NEEDED, ties=TIES)
-FLAKY = st.builds(Participation, salt=st.integers(0, 99), needed=NEEDED, ties=TIES, tenths=st.sampled_from([6, 9]))
+FLAKY = st.builds(
+    Participation, salt=st.integers(0, 99), needed=NEEDED, ties=TIES, tenths=st.sampled_from([6, 9])
+)
 
 
 def worlds_of(state):
@@ -40,36 +46,54 @@ def test_every_outcome_is_that_of_a_simulation_and_the_end_is_the_same(made_by, 
     with tempfile.TemporaryDirectory() as folder:
         ends = []
         for wanted in (True, False):
-            path, pool = sliced_run(Path(folder), slice=wanted, accept_rate=accept), made_by.pool(seed=seed)
+            path, pool = (
+                sliced_run(Path(folder), slice=wanted, accept_rate=accept),
+                made_by.pool(seed=seed),
+            )
             state = drive(path, pool)
             for test, keep in worlds_of(state):
                 outcome, met, _ = made_by.run(keep, test.seed)
                 assert test.outcome == outcome
-                assert test.took_part is not None and set(test.took_part.names(state.elements)) == met
+                assert (
+                    test.took_part is not None and set(test.took_part.names(state.elements)) == met
+                )
             ends.append((state.environment, state.minimal))
             assert state.made == len(pool.made)
             assert state.refuted is None
             assert wanted or not (state.implied or state.audits)
-        assert ends[0] == ends[1] == (tuple(name for name in MODELS if name in made_by.needed), True)
+        assert (
+            ends[0] == ends[1] == (tuple(name for name in MODELS if name in made_by.needed), True)
+        )
 
 
 @pytest.mark.parametrize(("share", "simulated"), [(0.1, 1), (-1.0, 0)])
-def test_what_a_certificate_rests_on_is_simulated_where_that_is_cheap(tmp_path, monkeypatch, share, simulated):
+def test_what_a_certificate_rests_on_is_simulated_where_that_is_cheap(
+    tmp_path, monkeypatch, share, simulated
+):
     """One of the fresh runs of this simulator follows from another one."""
     monkeypatch.setattr("ddenv.engine.slicing.CHEAP", share)
     made_by = Participation(salt=8, needed=(MODELS[0], MODELS[3]), tenths=8)
     state = drive(sliced_run(tmp_path, accept_rate="kept", audit=1_000_000), made_by.pool())
     fresh = [test for test in state.finished_tests if test.phase == CERTIFY]
-    audits, implied = (sum(getattr(test, kind) is not None for test in fresh) for kind in ("audits", "implied_by"))
+    audits, implied = (
+        sum(getattr(test, kind) is not None for test in fresh) for kind in ("audits", "implied_by")
+    )
     assert (audits, implied) == (simulated, 1 - simulated)
 
 
-METHODS = [{}, {"algorithm": "splitting"}, {"pair": "model2model/timestep"}, {"pair": "learner/timestep"}]
+METHODS = [
+    {},
+    {"algorithm": "splitting"},
+    {"pair": "model2model/timestep"},
+    {"pair": "learner/timestep"},
+]
 HALF = Participation(salt=40, needed=(MODELS[18], MODELS[3], MODELS[7]), tenths=6)
 
 
 @pytest.mark.fuzz
-@given(made_by=FLAKY, jobs=st.integers(2, 4), seed=st.integers(0, 9), method=st.sampled_from(METHODS))
+@given(
+    made_by=FLAKY, jobs=st.integers(2, 4), seed=st.integers(0, 9), method=st.sampled_from(METHODS)
+)
 # What a run has in view beside what took part in it is otherwise where it is simulated again.
 @example(made_by=HALF, jobs=3, seed=0, method=METHODS[2])
 @example(made_by=HALF, jobs=3, seed=0, method=METHODS[3])
@@ -77,7 +101,10 @@ HALF = Participation(salt=40, needed=(MODELS[18], MODELS[3], MODELS[7]), tenths=
 def test_neither_workers_nor_audits_change_anything(made_by, jobs, seed, method):
     with tempfile.TemporaryDirectory() as folder:
         alone, together = (
-            drive(sliced_run(Path(folder), accept_rate="kept", audit=audit, **method), made_by.pool(workers, seed))
+            drive(
+                sliced_run(Path(folder), accept_rate="kept", audit=audit, **method),
+                made_by.pool(workers, seed),
+            )
             for workers, audit in ((1, 1), (jobs, 1_000_000))
         )
     assert together.refuted is None
@@ -91,7 +118,9 @@ def test_neither_workers_nor_audits_change_anything(made_by, jobs, seed, method)
     accept=st.sampled_from(["first", "kept"]),
 )
 @examples(0.3)
-def test_killed_at_any_moment_it_resumes_to_the_same_end_and_makes_no_test_twice(made_by, moments, jobs, accept):
+def test_killed_at_any_moment_it_resumes_to_the_same_end_and_makes_no_test_twice(
+    made_by, moments, jobs, accept
+):
     with tempfile.TemporaryDirectory() as folder:
         undisturbed = drive(sliced_run(Path(folder), accept_rate=accept), made_by.pool())
         path = sliced_run(Path(folder), accept_rate=accept)
@@ -106,16 +135,22 @@ def test_killed_at_any_moment_it_resumes_to_the_same_end_and_makes_no_test_twice
 @examples(0.3)
 def test_a_simulator_that_does_not_say_all_is_found_out(made_by, jobs, data):
     """Whatever it hides, the run ends as if it had never been asked."""
-    liar = Participation(made_by.salt, made_by.needed, made_by.ties, hidden=frozenset(made_by.needed))
+    liar = Participation(
+        made_by.salt, made_by.needed, made_by.ties, hidden=frozenset(made_by.needed)
+    )
     with tempfile.TemporaryDirectory() as folder:
-        path = sliced_run(Path(folder), accept_rate=data.draw(st.sampled_from(["first", "kept"])), audit=1)
+        path = sliced_run(
+            Path(folder), accept_rate=data.draw(st.sampled_from(["first", "kept"])), audit=1
+        )
         state = drive(path, liar.pool(jobs))
         assert set(state.environment) == set(made_by.needed)
         assert state.minimal
         if state.refuted is not None:
             assert not state.implied
             assert all(
-                test.outcome == made_by.run(keep, test.seed)[0] for test, keep in worlds_of(state) if test.is_finished
+                test.outcome == made_by.run(keep, test.seed)[0]
+                for test, keep in worlds_of(state)
+                if test.is_finished
             )
 
 
@@ -152,7 +187,9 @@ def test_what_rested_on_slices_is_open_again(tmp_path):
     assert before.here.how == "sliced"
     assert after.environment == state.elements
     assert after.implied == 0
-    assert [point.tests for point in after.history] == sorted(point.tests for point in after.history)
+    assert [point.tests for point in after.history] == sorted(
+        point.tests for point in after.history
+    )
     assert not any(test.implied_by for test in after.tests if test.is_finished)
     assert state.made == sum(test.is_finished for test in state.tests)
 
@@ -170,7 +207,10 @@ def test_a_slice_that_is_taken_back_is_not_taken_again(tmp_path):
         yield "undo", {}
 
     state = guided(sliced_run(tmp_path, accept_rate="kept"), guide())
-    assert [(node.how, node.rejected) for node in state.nodes[:2]] == [("start", False), ("sliced", True)]
+    assert [(node.how, node.rejected) for node in state.nodes[:2]] == [
+        ("start", False),
+        ("sliced", True),
+    ]
     assert all(set(node.environment) != set(state.nodes[1].environment) for node in state.nodes[2:])
     assert set(state.environment) == set(HONEST.needed)
 
@@ -190,7 +230,9 @@ def test_a_pinned_model_is_in_every_slice_with_what_it_is_tied_to(tmp_path):
 def test_where_each_reduction_waits_for_the_user_none_is_made_without_a_test(tmp_path):
     def guide():
         while True:
-            state = yield from until(lambda state: state.waiting_candidate is not None or state.ended)
+            state = yield from until(
+                lambda state: state.waiting_candidate is not None or state.ended
+            )
             yield "accept", {"round": state.round.number, "candidate": state.waiting_candidate}
 
     path = sliced_run(tmp_path, accept_rate="first")

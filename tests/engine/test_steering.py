@@ -30,7 +30,11 @@ def test_a_pinned_model_stays_and_is_part_of_every_candidate(tmp_path):
     assert state.minimal
     assert state.reason.endswith("; 1 pinned model was never left out")
     leg = [event.id for event in events(path) if event.kind == "leg_started"][-1]
-    started = [asdict(event.event)["test"] for event in events(path) if event.kind == "test_started" and event.id > leg]
+    started = [
+        asdict(event.event)["test"]
+        for event in events(path)
+        if event.kind == "test_started" and event.id > leg
+    ]
     assert all("ball" in models_in(state, test) for test in started)
     assert [one.kind for one in state.decisions] == ["pin"]
 
@@ -53,7 +57,9 @@ def test_a_selection_by_hand_is_tested_and_adopted(tmp_path, jobs):
         yield "try", {"models": numbers("ball", "beam")}
         yield "try", {"models": numbers("wall", "beam")}
         # They are tested while the rounds are paused.
-        state = yield from until(lambda state: len(state.trials) == 2 and all(one.verdict for one in state.trials))
+        state = yield from until(
+            lambda state: len(state.trials) == 2 and all(one.verdict for one in state.trials)
+        )
         assert state.status == "paused"
         assert [trial.verdict for trial in state.trials] == ["dissimilar", "similar"]
         yield "adopt", {"trial": 1}
@@ -96,7 +102,11 @@ def test_another_failure_is_taken_for_as_good(tmp_path):
 def test_a_model_that_only_helps_is_left_out_and_the_search_goes_on(tmp_path):
     def oracle(keep, seed):
         # In the search f is gone without the beam; with fresh seeds it is only rarer.
-        return "similar" if "wall" in keep and ("beam" in keep or (seed >= FIRST_FRESH_RUN and seed % 11)) else "pass"
+        return (
+            "similar"
+            if "wall" in keep and ("beam" in keep or (seed >= FIRST_FRESH_RUN and seed % 11))
+            else "pass"
+        )
 
     path = new_run(tmp_path, accept_rate="kept")
     before = drive(path, FakePool(oracle, 2))
@@ -105,15 +115,24 @@ def test_a_model_that_only_helps_is_left_out_and_the_search_goes_on(tmp_path):
     send(path, "leave_out", model=ELEMENTS.index("beam"))
     state = drive(path, FakePool(oracle, 2))
     assert (state.environment, state.minimal) == (("wall",), True)
-    assert (state.here.how, state.decisions[-1].words) == ("left_out", "left out beam, which only helped")
+    assert (state.here.how, state.decisions[-1].words) == (
+        "left_out",
+        "left out beam, which only helped",
+    )
     # The run that it rests on is one of the certificate's.
     test = state.tests[state.here.evidence_test - 1]
-    assert (test.without, test.outcome, test.id in range(len(before.tests))) == ("beam", "similar", True)
+    assert (test.without, test.outcome, test.id in range(len(before.tests))) == (
+        "beam",
+        "similar",
+        True,
+    )
 
 
 def test_a_veto_is_taken_back(tmp_path):
     def guide():
-        state = yield from until(lambda state: state.round is not None and len(state.round.candidates) > 3)
+        state = yield from until(
+            lambda state: state.round is not None and len(state.round.candidates) > 3
+        )
         # The first two: that one is passed over when it is wanted again.
         for candidate in (0, 1):
             yield "veto", {"round": state.round.number, "candidate": candidate}
@@ -173,15 +192,23 @@ def test_what_cannot_be_is_refused_with_the_reason(tmp_path, kind, data, why):
     jobs=st.integers(1, 3),
 )
 @examples(0.25)
-def test_whatever_is_decided_and_whenever_it_is_killed_the_run_ends_sound(salt, plan, moments, jobs):
+def test_whatever_is_decided_and_whenever_it_is_killed_the_run_ends_sound(
+    salt, plan, moments, jobs
+):
     with tempfile.TemporaryDirectory() as folder:
-        path, oracle, plan = new_run(Path(folder)), flaky(salt, "wall", "beam"), sorted(plan, key=lambda one: one[0])
+        path, oracle, plan = (
+            new_run(Path(folder)),
+            flaky(salt, "wall", "beam"),
+            sorted(plan, key=lambda one: one[0]),
+        )
         killed(path, Disturbed(path, oracle, jobs, plan, salt), moments)
         state = drive(path, Disturbed(path, oracle, jobs, plan))
         assert state.status == "finished"
         # Whoever folds the file sees the same.
         assert state_of(path) == state
-        assert state.pinned <= set(state.environment) or any(one.kind == "go_back" for one in state.decisions)
+        assert state.pinned <= set(state.environment) or any(
+            one.kind == "go_back" for one in state.decisions
+        )
         finished = finished_tests(path)
         assert len(finished) == len(set(finished))
         for node in state.nodes[1:]:

@@ -33,7 +33,9 @@ def slipped(path, jobs=1):
 
 
 @pytest.mark.parametrize("jobs", [1, 3])
-def test_two_failures_within_epsilon_are_named_and_none_takes_the_place_of_the_other_unnoticed(tmp_path, jobs):
+def test_two_failures_within_epsilon_are_named_and_none_takes_the_place_of_the_other_unnoticed(
+    tmp_path, jobs
+):
     state = slipped(new_run(tmp_path, accept_rate="kept", baseline_runs=10, keep_rate=0.8), jobs)
     assert dict(state.notes)["two failures"] == (
         "the ends of f form two groups 0.3 m apart (6, 4 runs): these may be different failures; --epsilon 0.15 tells them apart"
@@ -42,7 +44,11 @@ def test_two_failures_within_epsilon_are_named_and_none_takes_the_place_of_the_o
     certificate = state.certificate
     runs = certificate.claims[0].shown
     # However many work.
-    assert (certificate.elsewhere.whole, certificate.elsewhere.left, certificate.elsewhere.of_left) == (6, 0, runs)
+    assert (
+        certificate.elsewhere.whole,
+        certificate.elsewhere.left,
+        certificate.elsewhere.of_left,
+    ) == (6, 0, runs)
     assert not is_minimal(certificate)
     assert not state.minimal
     assert verdict_on(certificate).startswith(
@@ -81,7 +87,10 @@ def test_somebody_who_looks_on_can_choose_before_the_search_begins(tmp_path, mon
     pool.shifted = scattered
     state = drive(path, pool, attended=True)
     assert {test.phase for test in paused[0].tests} == {"baseline"}
-    assert any(words.endswith("makes them one failure. Press c to change it.") for words in _offered(paused[0]))
+    assert any(
+        words.endswith("makes them one failure. Press c to change it.")
+        for words in _offered(paused[0])
+    )
     assert (state.baseline.failures, state.environment) == (10, ("wall",))
 
 
@@ -102,12 +111,16 @@ def test_a_failure_that_stops_to_show_ends_the_search_after_a_round_in_vain(tmp_
     path, pool = new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(lambda *_: "", 1)
     pool.oracle = warm(pool)
     with pytest.raises(
-        UserError, match=r"f does not repeat: it showed only in the first 10 runs, and in none of 3 replays; does"
+        UserError,
+        match=r"f does not repeat: it showed only in the first 10 runs, and in none of 3 replays; does",
     ):
         simulated_elsewhere(path, pool)
     assert len(pool.made) <= 30
     # A failure that repeats is replayed once a round.
-    path, pool = new_run(tmp_path, accept_rate="kept", baseline_runs=10), FakePool(needs("wall", "ball", "deck"), 1)
+    path, pool = (
+        new_run(tmp_path, accept_rate="kept", baseline_runs=10),
+        FakePool(needs("wall", "ball", "deck"), 1),
+    )
     state = simulated_elsewhere(path, pool)
     assert state.environment == ("deck", "wall", "ball")
     assert len(pool.made) - len(state.tests) <= state.rounds_done
@@ -118,7 +131,9 @@ def test_a_certificate_ends_once_f_does_not_show_any_more(tmp_path):
     pool.oracle = warm(pool)
     state = drive(path, pool)
     assert state.reason.startswith("f does not repeat; not shown that what is left keeps ")
-    assert [(claim.without, claim.shown, claim.runs) for claim in state.certificate.claims] == [(None, 0, 30)]
+    assert [(claim.without, claim.shown, claim.runs) for claim in state.certificate.claims] == [
+        (None, 0, 30)
+    ]
 
 
 def widened(tmp_path, before, epsilon, jobs=1, algorithm="ddenv"):
@@ -128,7 +143,9 @@ def widened(tmp_path, before, epsilon, jobs=1, algorithm="ddenv"):
         yield from until(lambda state: state.round is not None and state.round.number == 2)
         yield "change", {"settings": {"epsilon": epsilon}}
 
-    path = new_run(tmp_path, accept_rate="kept", baseline_runs=10, keep_rate=0.8, algorithm=algorithm)
+    path = new_run(
+        tmp_path, accept_rate="kept", baseline_runs=10, keep_rate=0.8, algorithm=algorithm
+    )
     with RunFile(path) as file:
         assert read_subject(file).scenario.failure.epsilon == before
     pool = Guided(path, two, guide(), jobs)
@@ -137,7 +154,9 @@ def widened(tmp_path, before, epsilon, jobs=1, algorithm="ddenv"):
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_with_another_epsilon_stored_ends_are_judged_again_and_no_test_is_repeated(tmp_path, monkeypatch, jobs):
+def test_with_another_epsilon_stored_ends_are_judged_again_and_no_test_is_repeated(
+    tmp_path, monkeypatch, jobs
+):
     monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
     path, state, made = widened(tmp_path, 0.4, 0.15, jobs)
     # Now only the failure of the wall is f, and the beam's is another one.
@@ -154,7 +173,9 @@ def test_with_another_epsilon_stored_ends_are_judged_again_and_no_test_is_repeat
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_with_another_failure_stored_ends_are_judged_again_and_no_test_is_repeated(tmp_path, monkeypatch, jobs):
+def test_with_another_failure_stored_ends_are_judged_again_and_no_test_is_repeated(
+    tmp_path, monkeypatch, jobs
+):
     monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
     refused = []
 
@@ -173,13 +194,17 @@ def test_with_another_failure_stored_ends_are_judged_again_and_no_test_is_repeat
     pool.shifted = where
     state = drive(path, pool)
     assert refused[0] == "failure: the whole world showed 1 failure; choose one of these"
-    assert refused[1].startswith("there is no failure number 3; 10 runs of the whole world showed these: 1. ")
+    assert refused[1].startswith(
+        "there is no failure number 3; 10 runs of the whole world showed these: 1. "
+    )
     # The wall's failure was the first one, and now that of the beam is f.
     assert (state.baseline.failures, state.baseline.runs) == (4, 10)
     assert state.environment == ("beam",)
     assert {test.outcome for test in state.tests if abs(test.end_pose[0] - 2.0) < 0.01} == {"other"}
     assert len(pool.made) == len(set(pool.made))
-    assert [decision.words for decision in state.decisions] == ["changed failure from 1 to 2, epsilon from 0.4 to 0.15"]
+    assert [decision.words for decision in state.decisions] == [
+        "changed failure from 1 to 2, epsilon from 0.4 to 0.15"
+    ]
 
 
 def test_an_epsilon_that_is_changed_before_f_is_known_counts_in_the_baseline(tmp_path, monkeypatch):
@@ -195,7 +220,9 @@ def test_an_epsilon_that_is_changed_before_f_is_known_counts_in_the_baseline(tmp
     assert drive(path, pool).baseline.failures == 6
 
 
-def test_a_very_rare_failure_asks_who_looks_on_how_to_go_on_and_can_be_reduced_exactly(tmp_path, monkeypatch):
+def test_a_very_rare_failure_asks_who_looks_on_how_to_go_on_and_can_be_reduced_exactly(
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
 
     def guide():
@@ -229,7 +256,9 @@ def test_an_epsilon_wider_than_the_way_is_told(tmp_path):
 
 
 def test_a_robot_that_fails_without_any_model_is_told(tmp_path):
-    state = drive(new_run(tmp_path, accept_rate="kept", growth="steady"), FakePool(lambda *_: "similar", 1))
+    state = drive(
+        new_run(tmp_path, accept_rate="kept", growth="steady"), FakePool(lambda *_: "similar", 1)
+    )
     assert not state.environment
     assert state.reason.startswith(
         "fails without any model: look at the ground, the robot, its controller, or something that is "

@@ -37,10 +37,16 @@ def pinned(home):
     run.certify_all(1, None, 23 * "s")
     for name in ("crate_01", "crate_02"):
         run.certify_all(1, name, 11 * "p")
-    run.finish_certificate((None, "kept", 23 * "s"), ("crate_01", "needed", 11 * "p"), ("crate_02", "needed", 11 * "p"))
+    run.finish_certificate(
+        (None, "kept", 23 * "s"), ("crate_01", "needed", 11 * "p"), ("crate_02", "needed", 11 * "p")
+    )
     events = run.file.events()
     state = fold(events)
-    run.write("finished", minimal=True, reason=verdict_on(state.certificate, never_left_out(state, state.certificate)))
+    run.write(
+        "finished",
+        minimal=True,
+        reason=verdict_on(state.certificate, never_left_out(state, state.certificate)),
+    )
     yield run
     run.close()
 
@@ -65,22 +71,33 @@ def test_screen_report_json_and_console_say_that_a_pinned_model_was_never_left_o
 def test_the_sentence_says_how_many_were_left_out(pinned):
     said = fold(pinned.file.events()).reason
     assert said.startswith("no other single model can be removed: f in 23 of 23 fresh runs")
-    assert f"without any one of these 2, f in none of 11 fresh runs each (upper bound: 55 % as often); {PINNED}" in said
+    assert (
+        f"without any one of these 2, f in none of 11 fresh runs each (upper bound: 55 % as often); {PINNED}"
+        in said
+    )
 
 
 def test_a_single_model_that_was_left_out_is_named(pinned):
     found = fold(pinned.file.events()).certificate
     said = verdict_on(replace(found, claims=found.claims[:2]))
-    assert said.endswith("; without crate_01, f in none of 11 fresh runs (upper bound: 55 % as often)")
+    assert said.endswith(
+        "; without crate_01, f in none of 11 fresh runs (upper bound: 55 % as often)"
+    )
 
 
 @given(st.floats(0.0, 1.0))
 def test_a_bound_is_rounded_to_the_side_on_which_it_holds(bound):
-    said_least, said_most = (float(said(bound)[:-2]) / 100.0 for said in (percent_at_least, percent_at_most))
+    said_least, said_most = (
+        float(said(bound)[:-2]) / 100.0 for said in (percent_at_least, percent_at_most)
+    )
     assert bound - 0.01 < said_least <= bound + 1e-9
     assert bound - 1e-9 <= said_most < bound + 0.01
 
 
 def test_a_bound_of_whole_percents_is_said_as_it_is():
-    assert [percent_at_least(part / 100.0) for part in range(101)] == [f"{part} %" for part in range(101)]
-    assert [percent_at_most(part / 100.0) for part in range(101)] == [f"{part} %" for part in range(101)]
+    assert [percent_at_least(part / 100.0) for part in range(101)] == [
+        f"{part} %" for part in range(101)
+    ]
+    assert [percent_at_most(part / 100.0) for part in range(101)] == [
+        f"{part} %" for part in range(101)
+    ]

@@ -16,17 +16,29 @@ def cloud(centre, reach, number, seed):
     """Ends that are equally likely everywhere within `reach` of a centre, m."""
     draw = random.Random(f"{centre} {reach} {seed}")
     polar = [(draw.uniform(0, math.tau), reach * math.sqrt(draw.random())) for _ in range(number)]
-    return [(centre[0] + far * math.cos(angle), centre[1] + far * math.sin(angle), centre[2]) for angle, far in polar]
+    return [
+        (centre[0] + far * math.cos(angle), centre[1] + far * math.sin(angle), centre[2])
+        for angle, far in polar
+    ]
 
 
-@given(seed=st.integers(0, 10**6), sizes=st.tuples(st.integers(2, 8), st.integers(3, 8)), reach=st.floats(0, 0.04))
-def test_two_failures_within_epsilon_are_told_apart_by_the_epsilon_that_is_named(seed, sizes, reach):
+@given(
+    seed=st.integers(0, 10**6),
+    sizes=st.tuples(st.integers(2, 8), st.integers(3, 8)),
+    reach=st.floats(0, 0.04),
+)
+def test_two_failures_within_epsilon_are_told_apart_by_the_epsilon_that_is_named(
+    seed, sizes, reach
+):
     ends = [*cloud(A, reach, sizes[0], seed), *cloud(B, reach, sizes[1], seed + 1)]
     random.Random(seed).shuffle(ends)
     found = groups_of(ends, EPSILON)
     assert sorted(map(len, found.groups)) == sorted(sizes)
     for group in found.groups:
-        inside, outside = ([end for one, end in enumerate(ends) if (one in group) is here] for here in (True, False))
+        inside, outside = (
+            [end for one, end in enumerate(ends) if (one in group) is here]
+            for here in (True, False)
+        )
         assert all(math.dist(inside[0], end) <= found.epsilon for end in inside)
         assert all(math.dist(inside[0], end) > found.epsilon for end in outside)
 
@@ -59,7 +71,13 @@ def test_ends_of_one_failure_and_of_several_far_apart_do_not_scatter():
 
 def test_what_is_left_ends_elsewhere():
     found = elsewhere([A] * 6 + [B] * 3, [B] * 11, EPSILON)
-    assert (found.whole, found.of_whole, found.left, found.of_left, found.epsilon) == (6, 9, 0, 11, 0.15)
+    assert (found.whole, found.of_whole, found.left, found.of_left, found.epsilon) == (
+        6,
+        9,
+        0,
+        11,
+        0.15,
+    )
     # A failure that is no longer there, and fewer runs of a rarer one, are none.
     assert elsewhere([A] * 7 + [B] * 2, [A] * 11, EPSILON) is None
     assert elsewhere([A] * 6 + [B] * 3, [A] * 7 + [B] * 4, EPSILON) is None

@@ -29,7 +29,17 @@ from ddenv.evidence.certificate import (
     keeps,
     settle,
 )
-from ddenv.evidence.margins import GONE, MISSED, MOST_OF_NUMBER, SHOWS, Known, Rule, error_each, margin_of, wanted
+from ddenv.evidence.margins import (
+    GONE,
+    MISSED,
+    MOST_OF_NUMBER,
+    SHOWS,
+    Known,
+    Rule,
+    error_each,
+    margin_of,
+    wanted,
+)
 from ddenv.evidence.rates import anytime_interval, estimated_rate, shows_at
 from ddenv.evidence.slices import fresh_chance
 from ddenv.reduction.isolation import Passing, passes
@@ -64,7 +74,10 @@ class World:
 
     def shown(self, salt):
         def shown(environment, run):
-            own, common = random.Random(f"{salt} {environment.bits} {run}"), random.Random(f"{salt} {run}")
+            own, common = (
+                random.Random(f"{salt} {environment.bits} {run}"),
+                random.Random(f"{salt} {run}"),
+            )
             luck = (common if common.random() < self.together else own).random()
             f = luck < {WHOLE: self.whole, LEFT: self.left}.get(environment, self.rest)
             against = f == (environment != LEFT)
@@ -111,7 +124,9 @@ NEEDED = {
 
 @pytest.mark.parametrize("world", NEEDED.values(), ids=NEEDED)
 def test_without_a_model_f_is_rarely_more_frequent_than_the_bound(world, check):
-    claims = [settle(falls(REST, LEFT, TERMS.error), world.shown(salt)) for salt in range(SIMULATED)]
+    claims = [
+        settle(falls(REST, LEFT, TERMS.error), world.shown(salt)) for salt in range(SIMULATED)
+    ]
     check(sum((claim.bound or 1.0) < world.rest / world.left for claim in claims), TERMS.error)
 
 
@@ -132,7 +147,9 @@ def test_what_is_said_of_the_rate_and_of_a_model_together_is_rarely_false(world,
     for salt in range(SIMULATED):
         kept = settle(keeps(LEFT, WHOLE, terms), world.shown(salt))
         model = settle(falls(REST, LEFT, terms.error_of_models(kept.bound)), world.shown(salt))
-        false += (kept.bound or 0.0) > world.left / world.whole or (model.bound or 1.0) < world.rest / world.left
+        false += (kept.bound or 0.0) > world.left / world.whole or (
+            model.bound or 1.0
+        ) < world.rest / world.left
     check(false, terms.error)
 
 
@@ -155,7 +172,10 @@ SEEMS = 0.4
 
 @pytest.mark.parametrize("world", WITHOUT.values(), ids=WITHOUT)
 def test_a_model_rarely_helps_or_seems_not_needed_where_that_is_false(world, check):
-    claims = [settle(falls(REST, LEFT, TERMS.error), world.shown(salt)).verdict for salt in range(SIMULATED)]
+    claims = [
+        settle(falls(REST, LEFT, TERMS.error), world.shown(salt)).verdict
+        for salt in range(SIMULATED)
+    ]
     if world.rest == world.left:
         check(claims.count("needed"), TERMS.error, sentence="needed")
         check(claims.count("helps") + claims.count("rarer"), 1.0 / REFUTED, sentence="helps")
@@ -167,7 +187,9 @@ def test_a_model_rarely_helps_or_seems_not_needed_where_that_is_false(world, che
 @pytest.mark.parametrize("together", [0.0, 0.8])
 def test_what_keeps_what_the_search_aims_at_is_rarely_lost(together, check):
     world = World(0.9, 0.721, together=together)
-    claims = [settle(keeps(LEFT, WHOLE, TERMS), world.shown(salt)).verdict for salt in range(SIMULATED)]
+    claims = [
+        settle(keeps(LEFT, WHOLE, TERMS), world.shown(salt)).verdict for salt in range(SIMULATED)
+    ]
     check(claims.count("lost"), 1.0 / REFUTED)
 
 
@@ -177,7 +199,10 @@ def test_a_world_rarely_passes_that_passes_as_seldom_as_the_whole_world(reached,
     rate, passed = min(rule.rather_than, 0.97), 0
     for salt in range(SIMULATED):
         shown = World(rate, rate).shown(salt)
-        passed += settle(passes(LEFT, Passing(rule.wanted, rule.rather_than, error), 10), shown).verdict == "passes"
+        passed += (
+            settle(passes(LEFT, Passing(rule.wanted, rule.rather_than, error), 10), shown).verdict
+            == "passes"
+        )
     check(passed, error)
 
 
@@ -213,7 +238,9 @@ LOOPS = {
     "one that takes a fifth": lambda kept: 0.9 * 0.81 ** ("b" not in kept),
     "either of two": lambda kept: 0.9 * (0.3 + 0.7 * bool(kept & set("bc"))),
     "two of four": lambda kept: 0.9 * (0.2, 0.6, 1.0, 1.0, 1.0)[len(kept & set("bcde"))],
-    "a model that hides it": lambda kept: 0.9 * (0.5 if "b" in kept else 1.0) * 0.5 ** ("c" not in kept),
+    "a model that hides it": lambda kept: (
+        0.9 * (0.5 if "b" in kept else 1.0) * 0.5 ** ("c" not in kept)
+    ),
 }
 
 
@@ -259,24 +286,39 @@ class Lucky(driving.World):
     crashes: float = 0.0
 
     def luck(self, environment, run):
-        common, own = random.Random(f"{self.seed} {run}"), random.Random(f"{self.seed} {environment.bits} {run}")
+        common, own = (
+            random.Random(f"{self.seed} {run}"),
+            random.Random(f"{self.seed} {environment.bits} {run}"),
+        )
         return (common if common.random() < self.together else own).random()
 
     @cached_property
     def before(self):
         """Below this luck the other failure shows, if at all."""
         luck = [self.luck(self.whole, run) for run in range(self.baseline_runs)]
-        first, second = (sum(low <= one < low + self.rate for one in luck) for low in (0.0, self.rate))
+        first, second = (
+            sum(low <= one < low + self.rate for one in luck) for low in (0.0, self.rate)
+        )
         return self.rate if self.competes and second > first else 0.0
 
     def outcome(self, environment, run):
         f = 0.0 <= self.luck(environment, run) - self.before < self.rate_in(environment)
-        crashes = random.Random(f"crash {self.seed} {environment.bits} {run}").random() < self.crashes
+        crashes = (
+            random.Random(f"crash {self.seed} {environment.bits} {run}").random() < self.crashes
+        )
         return "broken" if f and crashes else f
 
 
 LUCKY = Lucky(
-    tuple(range(6)), Environment.of([0]), Environment.of([1, 2]), "ddenv", 0, 0.9, 0.79, iterations=3, baseline_runs=10
+    tuple(range(6)),
+    Environment.of([0]),
+    Environment.of([1, 2]),
+    "ddenv",
+    0,
+    0.9,
+    0.79,
+    iterations=3,
+    baseline_runs=10,
 )
 REDUCTIONS = {
     "independent": LUCKY,
@@ -322,7 +364,10 @@ def sentences(world, driver):
                     yield "lost", rate < terms.keep_rate * world.rate
                 if not place:
                     # The others are about what the first ones left.
-                    runs = (driver.shown(named.environment, fact.certificate.first_run + run) for run in named.runs)
+                    runs = (
+                        driver.shown(named.environment, fact.certificate.first_run + run)
+                        for run in named.runs
+                    )
                     shown = [one for one in runs if one != "broken"]
                     low, high = anytime_interval(sum(shown), len(shown))
                     # Of the runs that did not break.
@@ -339,7 +384,14 @@ def test_models_that_are_called_needed_beside_others_that_only_help_are_rarely_n
     false = 0
     for seed in range(LONGER):
         ten = driving.World(
-            tuple(range(10)), NOTHING, Environment.whole(10), "ddenv", seed, 1.0, share, keeps_rate=False
+            tuple(range(10)),
+            NOTHING,
+            Environment.whole(10),
+            "ddenv",
+            seed,
+            1.0,
+            share,
+            keeps_rate=False,
         )
         driver = driving.Driver(ten)
         made = driver.drive(certify(driver, driver.leg(), (ten.whole,)))
@@ -354,7 +406,12 @@ def test_a_model_is_rarely_needed_in_another_simulator_where_it_is_not(rate, wit
     for salt in range(SIMULATED):
         draw = random.Random(salt)
         results = [
-            {"without": name, "models": 2, "outcome": "similar" if draw.random() < one else "pass", "seed": seed}
+            {
+                "without": name,
+                "models": 2,
+                "outcome": "similar" if draw.random() < one else "pass",
+                "seed": seed,
+            }
             for name, one in ((None, rate), ("crate", without))
             for seed in range(40)
         ]
@@ -383,7 +440,9 @@ def test_the_goal_is_rarely_said_to_be_reached_to_the_end_where_it_is_not(rate, 
         while asks := list(wanted(asked, rule, Known(outcomes, outcomes))):
             for value, _ in asks:
                 goal, f = window[0] <= value < window[1], draw.random() < rate
-                outcomes.setdefault(value, []).append("pass" if goal else "similar" if f else "other")
+                outcomes.setdefault(value, []).append(
+                    "pass" if goal else "similar" if f else "other"
+                )
         false += margin_of(asked, rule, Known(outcomes, outcomes)).up.to_end
     check(false, ERROR, LONGER, sentence="to the end")
 
@@ -411,8 +470,14 @@ def test_what_margins_say_of_the_values_of_a_number_is_rarely_false(share, goal,
         while asks := list(wanted(asked, rule, Known(outcomes, outcomes))):
             for value, _ in asks:
                 f, reached = draw.random() < share * rate, draw.random() < goal
-                outcomes.setdefault(value, []).append("similar" if f else "pass" if reached else "other")
-        tried = [value for side in margin_of(asked, rule, Known(outcomes, outcomes)).sides for value in side.tried]
+                outcomes.setdefault(value, []).append(
+                    "similar" if f else "pass" if reached else "other"
+                )
+        tried = [
+            value
+            for side in margin_of(asked, rule, Known(outcomes, outcomes)).sides
+            for value in side.tried
+        ]
         false += any(value.verdict in wrong for value in tried)
     check(false, ERROR, sentence="f up to, no f at, goal at")
 
@@ -453,7 +518,9 @@ def test_about_eight_of_ten_certificates_take_as_many_tests_as_forecast(world, c
 def forecasts(shown, models=3):
     """How many tests a certificate takes, and its forecasts: after a baseline of ten runs, and after ten pairs without a model."""
     seen = sum(shown(WHOLE, -1 - run) is True for run in range(10))
-    first = certificate_tests(estimated_rate(seen, 10), TERMS.certify_rate, models, TERMS.at_least, 10)
+    first = certificate_tests(
+        estimated_rate(seen, 10), TERMS.certify_rate, models, TERMS.at_least, 10
+    )
     kept = settle(keeps(LEFT, WHOLE, TERMS), shown)
     made, from_here = dict.fromkeys(kept.rests_on), None
     for place in range(models if kept.verdict != "lost" else 0):
@@ -463,7 +530,9 @@ def forecasts(shown, models=3):
             pairs = Pairs()
             done = {**made, **dict.fromkeys(claim.rests_on[: 2 * PAIRS])}
             for run in range(PAIRS):
-                pairs = pairs.after(*(shown(*test) for test in claim.rests_on[2 * run : 2 * run + 2]))
+                pairs = pairs.after(
+                    *(shown(*test) for test in claim.rests_on[2 * run : 2 * run + 2])
+                )
             of_left = sum(environment == LEFT for environment, _ in done)
             still = [PAIRS, *[0] * (models - 1 - place)]
             from_here = certificate_from_here(len(done), of_left, still, pairs, PAIRS)

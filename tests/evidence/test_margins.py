@@ -12,18 +12,29 @@ from ddenv.evidence.margins import MOST_OF_NUMBER, Known, Rule, margin_of, steps
 from ddenv.runfile.events import NumberAsked
 from tests.tiers import examples, slow
 
-PLACE = NumberAsked(name="barrel.y", now=0.5, low=-2.5, high=3.5, scale=3.0, resolution=0.01, unit="m")
-FRICTION = NumberAsked(name="patch.friction", now=0.0015, low=0.0, high=1.0, scale=1.0, resolution=0.002)
+PLACE = NumberAsked(
+    name="barrel.y", now=0.5, low=-2.5, high=3.5, scale=3.0, resolution=0.01, unit="m"
+)
+FRICTION = NumberAsked(
+    name="patch.friction", now=0.0015, low=0.0, high=1.0, scale=1.0, resolution=0.002
+)
 # The error of one verdict where all of some fifteen values of a number are right in 95 of 100.
 ERROR = 0.05 / 15
 
 
-def explored(asked, rate, runs_of, most=MOST_OF_NUMBER, impossible=lambda value: False, chosen=None):
+def explored(
+    asked, rate, runs_of, most=MOST_OF_NUMBER, impossible=lambda value: False, chosen=None
+):
     """The margin of a number whose run i at a value ends as `runs_of(value, i)`; runs end in any order with `chosen`."""
     rule, made, refused = Rule(rate, ERROR), {}, {}
     while True:
         known = Known(
-            {value: [runs[run] for run in range(len(runs)) if run in runs] for value, runs in made.items()}, {}, refused
+            {
+                value: [runs[run] for run in range(len(runs)) if run in runs]
+                for value, runs in made.items()
+            },
+            {},
+            refused,
         )
         asks = list(wanted(asked, rule, known, most))
         if not asks:
@@ -50,7 +61,12 @@ def planted(asked, rate, limit, goal, salt):
 
 
 @pytest.mark.parametrize(
-    "case", slow(pytest.mark.rates, itertools.product((PLACE, FRICTION), (1.0, 0.9, 0.7)), but=[(FRICTION, 0.9)])
+    "case",
+    slow(
+        pytest.mark.rates,
+        itertools.product((PLACE, FRICTION), (1.0, 0.9, 0.7)),
+        but=[(FRICTION, 0.9)],
+    ),
 )
 def test_the_interval_found_covers_the_truth(case):
     asked, rate = case
@@ -93,7 +109,11 @@ def test_nothing_is_assumed_between_the_values_or_beyond_them():
     assert not margin.up.to_end
     assert (margin.down.until.value, margin.down.gone) == (PLACE.low, None)
     other = explored(PLACE, 1.0, lambda value, _: "other" if value in goals else "similar")
-    assert (other.up.gone.value, other.up.again.value, other.up.goal) == (goals[0], PLACE.high, None)
+    assert (other.up.gone.value, other.up.again.value, other.up.goal) == (
+        goals[0],
+        PLACE.high,
+        None,
+    )
 
 
 @given(limit=st.floats(0.6, 3.2), window=st.floats(0.2, 3.0))
@@ -105,7 +125,9 @@ def test_the_goal_is_said_to_be_reached_to_the_end_only_where_runs_beyond_reache
         return "similar" if value < limit else "pass" if value < limit + window else "other"
 
     side = explored(PLACE, 1.0, outcome).up
-    assert side.goal is None or side.to_end == (limit + window > PLACE.high and side.goal.value < PLACE.high)
+    assert side.goal is None or side.to_end == (
+        limit + window > PLACE.high and side.goal.value < PLACE.high
+    )
     if side.to_end:
         values = [one.value for one in side.tried if one.value >= side.goal.value]
         assert PLACE.high in values and len(values) >= 4

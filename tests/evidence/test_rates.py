@@ -19,8 +19,14 @@ def test_wilson_interval_of_ten_runs_covers_as_many_rates_as_the_docs_say():
     intervals = [wilson_interval(shown, 10) for shown in range(11)]
 
     def covered(rate):
-        chances = [math.comb(10, shown) * rate**shown * (1 - rate) ** (10 - shown) for shown in range(11)]
-        return sum(chance for chance, (low, high) in zip(chances, intervals, strict=True) if low <= rate <= high)
+        chances = [
+            math.comb(10, shown) * rate**shown * (1 - rate) ** (10 - shown) for shown in range(11)
+        ]
+        return sum(
+            chance
+            for chance, (low, high) in zip(chances, intervals, strict=True)
+            if low <= rate <= high
+        )
 
     shares = [covered(place / 1000) for place in range(1, 1000)]
     assert sum(shares) / len(shares) == pytest.approx(0.95, abs=0.005)

@@ -55,7 +55,9 @@ def test_a_slice_is_told_with_the_chance_that_a_fresh_run_meets_what_went(moment
         f"  reduced to {len(after.environment)} models: {gone} models cannot have affected any of the 3 runs"
     )
     assert "the chance that a fresh run meets a model not met before is " in line
-    assert slice_in_short(after, after.here).startswith(f"none of 3 runs met the other {gone}; a fresh run meets one: ")
+    assert slice_in_short(after, after.here).startswith(
+        f"none of 3 runs met the other {gone}; a fresh run meets one: "
+    )
 
 
 def test_the_workbench_teaches_what_is_implied(moments):
@@ -74,7 +76,9 @@ def test_the_workbench_teaches_what_is_implied(moments):
 def test_the_row_of_a_candidate_names_the_run_that_implies_its_test(moments):
     event = first(moments, "implied")[0].event
     judged = next(
-        after for each, _, after in moments if each.kind == "candidate_judged" and event.test in each.event.tests
+        after
+        for each, _, after in moments
+        if each.kind == "candidate_judged" and event.test in each.event.tests
     )
     shown = Snapshot(state=judged, live=(), engine="alive")
     listing = listed(shown)
@@ -88,7 +92,9 @@ def test_a_program_gets_the_number_of_simulated_tests(run, moments):
     told = summary(state, run)
     search = [test for test in state.tests if test.phase != "certify"]
     assert told["simulated"] == sum(test.implied_by is None for test in search) < len(search)
-    assert any(f"{state.implied} implied, not simulated" in line for line in summary_lines(state, run))
+    assert any(
+        f"{state.implied} implied, not simulated" in line for line in summary_lines(state, run)
+    )
     json.dumps(told, allow_nan=False)
 
 
@@ -102,7 +108,9 @@ def test_the_map_of_a_run_shows_what_took_part(run, monkeypatch, capsys):
     said = in_process(monkeypatch, capsys, "world", "show", run, "--took-part")
     assert said.returncode == 0
     state = state_of(run)
-    met = set().union(*(test.took_part.names(state.elements) for test in state.tests if test.phase == "baseline"))
+    met = set().union(
+        *(test.took_part.names(state.elements) for test in state.tests if test.phase == "baseline")
+    )
     for name in MODELS:
         assert (f"  {name}: " in said.stdout) == (name in met)
     assert f"{len(met)} models of {len(state.elements)} may have affected the runs" in said.stdout

@@ -89,7 +89,11 @@ def test_the_engine_knows_what_to_do_for_each_command():
     [
         ("dance", {}, "there is no command 'dance'"),
         ("veto", {"round": 1}, "no such candidate: is missing"),
-        ("veto", {"round": True, "candidate": 0}, "no such round: should be a valid integer, found True"),
+        (
+            "veto",
+            {"round": True, "candidate": 0},
+            "no such round: should be a valid integer, found True",
+        ),
         ("pin", {"models": "wall"}, "no such models: should be a valid array, found 'wall'"),
         ("try", {"models": [True]}, "no such models: 0: should be a valid integer, found True"),
         ("step", {"unit": "year"}, "no such unit: should be 'test' or 'round', found 'year'"),
@@ -122,7 +126,9 @@ RUNS = {
 @examples(0.3)
 @given(**RUNS, mode=st.sampled_from(["automatic"]), asked=st.lists(ANY, min_size=1, max_size=6))
 @example(salt=0, plan=[], moment=3, mode="automatic", asked=[("accept_mode", {"mode": "ask"})] * 2)
-def test_the_engine_obeys_what_the_rules_allow_and_refuses_the_rest_in_their_words(salt, plan, moment, mode, asked):
+def test_the_engine_obeys_what_the_rules_allow_and_refuses_the_rest_in_their_words(
+    salt, plan, moment, mode, asked
+):
     with tempfile.TemporaryDirectory() as folder:
         path = begun(folder, salt, plan, moment, mode)
         with RunFile(path) as file:
@@ -148,7 +154,12 @@ def test_the_engine_obeys_what_the_rules_allow_and_refuses_the_rest_in_their_wor
 
 
 @examples(0.3)
-@given(**RUNS, models=st.sets(st.sampled_from(ELEMENTS), max_size=3), follows=st.booleans(), row=st.integers(0, 9))
+@given(
+    **RUNS,
+    models=st.sets(st.sampled_from(ELEMENTS), max_size=3),
+    follows=st.booleans(),
+    row=st.integers(0, 9),
+)
 def test_what_a_key_offers_is_what_the_engine_obeys(salt, plan, moment, models, follows, row):
     with tempfile.TemporaryDirectory() as folder:
         path = begun(folder, salt, plan, moment, "automatic")
@@ -156,7 +167,9 @@ def test_what_a_key_offers_is_what_the_engine_obeys(salt, plan, moment, models, 
             file.own()
             state = Journal(file).state
             rows = [*(state.round.candidates if state.round else ()), *state.trials, None]
-            pointed = Pointed(rows[row % len(rows)], follows, tuple(name for name in ELEMENTS if name in models))
+            pointed = Pointed(
+                rows[row % len(rows)], follows, tuple(name for name in ELEMENTS if name in models)
+            )
             for action in ACTIONS:
                 offered = offer(action, Situation(state), pointed)
                 if offered.command is None or isinstance(offered.command, StartEngine):
@@ -184,7 +197,9 @@ def test_the_footer_offers_what_the_rules_allow(salt, plan, moment, models, engi
         now = Situation(state, engine, barred)
         said, pointed = {}, Pointed(models=tuple(models))
         footer = SimpleNamespace(say=said.__setitem__, is_attached=True)
-        screen = SimpleNamespace(pointed=pointed, asking=SimpleNamespace(situation=now), _footer=footer)
+        screen = SimpleNamespace(
+            pointed=pointed, asking=SimpleNamespace(situation=now), _footer=footer
+        )
         screen.poll = SimpleNamespace(watch=False)
         RunScreen._show_keys(screen)
         for action, binding in GUIDING.items():

@@ -16,7 +16,9 @@ from ddenv.learn.score import Score, score_of, summary
 from tests.learn.lessons import course, opened
 
 ORACLE, PLAYS = opened(0).oracle, tuple(opened(0).plays.values())
-PLACES = st.lists(st.lists(st.integers(0, len(ORACLE.models) - 1), unique=True, max_size=8), max_size=25)
+PLACES = st.lists(
+    st.lists(st.integers(0, len(ORACLE.models) - 1), unique=True, max_size=8), max_size=25
+)
 
 
 def shows(models):
@@ -36,14 +38,18 @@ def tried(moves, budget=20):
 
 
 def searched(*groups, budget=20):
-    return tried([[ORACLE.models.index(name) for name in group.split()] for group in groups], budget)
+    return tried(
+        [[ORACLE.models.index(name) for name in group.split()] for group in groups], budget
+    )
 
 
 @given(PLACES)
 def test_a_verdict_is_what_the_robot_does_in_every_part(moves):
     attempt = tried(moves)
     held = frozenset(attempt.held)
-    assert shows(held) and all(each.outcome == delivery.outcome(each.kept) for each in attempt.tried)
+    assert shows(held) and all(
+        each.outcome == delivery.outcome(each.kept) for each in attempt.tried
+    )
     can_go = [name for name in held if shows(held - {name})]
     smallest = min(size for size in range(9) if any(map(shows, combinations(ORACLE.models, size))))
     assert attempt.found == (not can_go)
@@ -51,7 +57,11 @@ def test_a_verdict_is_what_the_robot_does_in_every_part(moves):
     assert sum(name in attempt.verdict for name in can_go) == min(3, len(can_go))
     if not can_go:
         assert ("not the smallest" in attempt.verdict) == (len(held) > smallest)
-    assert len({frozenset(each.kept) for each in attempt.tried}) == len(attempt.tried) <= attempt.budget
+    assert (
+        len({frozenset(each.kept) for each in attempt.tried})
+        == len(attempt.tried)
+        <= attempt.budget
+    )
 
 
 @given(PLACES)
@@ -63,7 +73,10 @@ def test_a_search_goes_on_where_it_was_left(moves):
 
 
 @given(
-    st.lists(st.text(max_size=20) | st.sampled_from(["test sign", "back", "end", "test nobody", "test"]), max_size=30)
+    st.lists(
+        st.text(max_size=20) | st.sampled_from(["test sign", "back", "end", "test nobody", "test"]),
+        max_size=30,
+    )
 )
 def test_kept_moves_that_are_not_possible_do_no_harm(moves):
     attempt = Attempt(ORACLE, 3, moves)
@@ -95,7 +108,10 @@ def test_a_test_that_tells_nothing_costs_nothing():
     [
         (("bench plant",), "stopped at 6 models, and at least one of them can still go"),
         (("bench plant pallet bin", "barrel cone"), "fewer than 5: luck"),
-        (("bench plant pallet bin", "crate", "sign", "barrel", "cone", "sign barrel"), "no algorithm needed fewer"),
+        (
+            ("bench plant pallet bin", "crate", "sign", "barrel", "cone", "sign barrel"),
+            "no algorithm needed fewer",
+        ),
         (
             ("bench", "plant", "pallet", "bin", "crate", "sign", "barrel", "cone"),
             "splitting needed fewer: splitting 7",
@@ -109,7 +125,11 @@ def test_one_sentence_compares_with_the_algorithms(groups, words):
 def test_side_by_side_are_the_student_the_algorithms_and_the_bound():
     attempt = searched("bench plant pallet bin", "crate")
     lines = {line.name: line for line in comparison(ORACLE, PLAYS, attempt)}
-    assert (lines["you"].tests, lines["you"].left, lines["you"].can_go) == (2, ("sign", "barrel", "cone"), False)
+    assert (lines["you"].tests, lines["you"].left, lines["you"].can_go) == (
+        2,
+        ("sign", "barrel", "cone"),
+        False,
+    )
     assert lines["minimum"].tests == math.ceil(math.log2(56)) == bound(8, 3)
     assert lines.keys() >= {"ddmin", "ddenv", "splitting", "probdd"}
     for play in PLAYS:
@@ -117,7 +137,9 @@ def test_side_by_side_are_the_student_the_algorithms_and_the_bound():
 
 
 def test_the_first_search_that_ends_counts_and_the_end_says_it():
-    walk = course(0, Score(step=next(n for n, step in enumerate(opened(0).lesson.steps) if step.budget)))
+    walk = course(
+        0, Score(step=next(n for n, step in enumerate(opened(0).lesson.steps) if step.budget))
+    )
     assert walk.due and not walk.go_on()
     walk.keep(attempt := searched("bench plant pallet bin", "crate"))
     assert walk.attempt.moves == attempt.moves and walk.score.right == 1 and not walk.due

@@ -44,10 +44,18 @@ def test_a_place_is_the_event_that_its_words_say(events, position, words, kind):
 def test_figures_of_a_certificate_are_those_of_its_runs(position):
     state = position.end
     figures = Figures(state, state)
-    fresh = [test for test in state.tests if test.phase == "certify" and test.run >= state.certificate.first_run]
+    fresh = [
+        test
+        for test in state.tests
+        if test.phase == "certify" and test.run >= state.certificate.first_run
+    ]
 
     def said(node, without):
-        runs = [test.outcome == "similar" for test in fresh if (test.node, test.without) == (node, without)]
+        runs = [
+            test.outcome == "similar"
+            for test in fresh
+            if (test.node, test.without) == (node, without)
+        ]
         return f"f in {sum(runs)} of {len(runs)} fresh runs ("
 
     for name in state.environment:
@@ -63,7 +71,11 @@ def test_bounds_are_those_of_the_pairs_at_the_place_of_the_step(events, position
         state = position.state(places.event(result))
         first, ran = (
             state.certificate.first_run,
-            {(test.node, test.run): test.outcome == "similar" for test in state.confirm_tests if test.is_finished},
+            {
+                (test.node, test.run): test.outcome == "similar"
+                for test in state.confirm_tests
+                if test.is_finished
+            },
         )
         mine = [run for node, run in ran if node == state.node and run >= first]
         # Where what is left showed f, the whole world is taken to show it, too.
@@ -72,7 +84,10 @@ def test_bounds_are_those_of_the_pairs_at_the_place_of_the_step(events, position
             pairs = pairs.after(ran[state.node, run], ran.get((0, run), True))
             shown = pairs.keeps_at_least(state.certificate.error * IN_TURN, shown)
         figures = Figures(position.end, state)
-        assert figures("here_left") == f"{sum(ran[state.node, run] for run in mine)} of {len(mine)} runs"
+        assert (
+            figures("here_left")
+            == f"{sum(ran[state.node, run] for run in mine)} of {len(mine)} runs"
+        )
         assert figures("here_bound") == percent_at_least(shown) and before < shown < 2 / 3
         before = shown
     with pytest.raises(UserError, match="no fresh run has yet left 'gate' out"):
@@ -86,7 +101,11 @@ def test_bounds_are_those_of_the_pairs_at_the_place_of_the_step(events, position
 
 def test_how_often_f_showed_in_the_whole_world_is_told_if_it_ran_with_all_seeds(events, position):
     state = position.state(Places(position, events).event("claims 1"))
-    fresh = [test.outcome == "similar" for test in state.confirm_tests if test.node == 0 and test.without is None]
+    fresh = [
+        test.outcome == "similar"
+        for test in state.confirm_tests
+        if test.node == 0 and test.without is None
+    ]
     assert Figures(position.end, state)("here_fresh_whole").startswith(
         f"f in {sum(fresh)} of {len(fresh)} fresh runs ("
     )

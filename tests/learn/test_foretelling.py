@@ -18,7 +18,9 @@ def sound(question):
     assert not question.answers[question.right].misconception, question
     assert len({answer.text for answer in question.answers}) == len(question.answers) >= 2, question
     assert all(
-        answer.why and (answer.why[0].isupper() or answer.why[:2] in ("f ", "n ")) and answer.why[-1] == "."
+        answer.why
+        and (answer.why[0].isupper() or answer.why[:2] in ("f ", "n "))
+        and answer.why[-1] == "."
         for answer in question.answers
     ), question
 
@@ -36,7 +38,9 @@ def of_outcome(position, moment, found):
     reason = found.reason.answers[found.reason.right]
     assert any(words in reason.text for words in REASONS[test.outcome].split("|"))
     # Nobody calls four misses a single test.
-    same = [(each.round, each.candidate) for each in position.end.tests[:number]].count((test.round, test.candidate))
+    same = [(each.round, each.candidate) for each in position.end.tests[:number]].count(
+        (test.round, test.candidate)
+    )
     if test.outcome == "pass" and settings(moment.after).accept_rate == "first" and same > 1:
         said = " ".join(answer.why for answer in found.reason.answers)
         assert "one test" not in said
@@ -65,7 +69,9 @@ def of_winner(position, moment, found):
     labels = {one.label: one for one in end.candidates}
     for answer in found.question.answers[:-1]:
         one = labels[answer.text.partition(":")[0]]
-        assert ("did not show f" in answer.why) == (one.verdict != "similar" and not untried(end, one)), answer
+        assert ("did not show f" in answer.why) == (
+            one.verdict != "similar" and not untried(end, one)
+        ), answer
         assert ("no longer tried" in answer.why) == untried(end, one), answer
     assert len(round.candidates) == len(end.candidates)
 
@@ -95,7 +101,9 @@ def test_every_answer_fits_what_the_run_did(run):
     for id in position.ids:
         moment = position.moment(id)
         hand = at_hand(moment)
-        for what in {hand} - {None} | ({"parts"} if moment.recorded.kind == "round_started" else set()):
+        for what in {hand} - {None} | (
+            {"parts"} if moment.recorded.kind == "round_started" else set()
+        ):
             found = foretelling(position, id, what)
             if found is None:
                 continue
@@ -115,7 +123,8 @@ def test_a_lesson_asks_for_each_reason_once(number):
     asked = [each for each in lesson.foretold if each is not None and each.reason is not None]
     assert len({each.kind for each in asked}) == len(asked)
     assert lesson.asked == len(asked) + sum(
-        bool(step.question or step.foretell or step.budget or step.race) for step in lesson.lesson.steps
+        bool(step.question or step.foretell or step.budget or step.race)
+        for step in lesson.lesson.steps
     )
 
 

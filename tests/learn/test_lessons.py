@@ -39,7 +39,12 @@ def test_wrong_answers_lead_there_too_and_name_what_was_mixed_up(number):
     end = through(course(number), wrong)
     assert end.score.done and end.score.right == 0 and end.score.best == 0
     assert len(end.score.misconceptions) >= 3
-    assert len([line for line in summary(opened(number).asked, end.score) if "of your answers" in line]) >= 3
+    assert (
+        len(
+            [line for line in summary(opened(number).asked, end.score) if "of your answers" in line]
+        )
+        >= 3
+    )
 
 
 @pytest.mark.parametrize("number", NUMBERS, ids=by_stem)
@@ -97,7 +102,8 @@ def test_a_search_tells_nothing_of_a_race_before_the_bet_on_it():
 
 def test_the_place_of_an_answer_does_not_give_it_away():
     places = [
-        [step.question.right for step in opened(number).lesson.steps if step.question is not None] for number in NUMBERS
+        [step.question.right for step in opened(number).lesson.steps if step.question is not None]
+        for number in NUMBERS
     ]
     for each in (*places, [place for lesson in places for place in lesson]):
         assert max(map(each.count, each)) <= len(each) / 2 + 1, places
@@ -132,7 +138,8 @@ def test_the_oracle_of_the_toy_world_knows_every_part_and_agrees_with_the_run():
         frozenset({"sign", "barrel", "cone"}),
     }
     assert len(oracle.showing) == sum(
-        delivery.outcome([name for bit, name in enumerate(oracle.models) if number >> bit & 1]) == "similar"
+        delivery.outcome([name for bit, name in enumerate(oracle.models) if number >> bit & 1])
+        == "similar"
         for number in range(2 ** len(oracle.models))
     )
 
@@ -142,7 +149,9 @@ def test_the_oracle_of_the_quay_has_the_rates_by_which_its_robot_drives():
     there = (*toys.QUAY.names, *(name for name, *_ in toys.QUAY.walls), "ground_plane")
     for gone in ((), ("ramp",), ("oil", "ramp"), ("gate",)):
         models = [name for name in there if name not in gone]
-        stuck = sum(quay.way(models, seed)[0][-1] == (quay.GATE_STOP, quay.OFF) for seed in range(400))
+        stuck = sum(
+            quay.way(models, seed)[0][-1] == (quay.GATE_STOP, quay.OFF) for seed in range(400)
+        )
         low, high = wilson_interval(stuck, 400)
         assert low <= oracle.rate(name for name in models if name in toys.QUAY.names) <= high
 

@@ -10,7 +10,18 @@ from docs.lessons.record_plays import record_plays
 
 from ddenv.errors import UserError
 from ddenv.learn.attempt import RecordedRound, read_oracle
-from ddenv.learn.race import KINDS, Play, Race, bet, plays_of_runs, recorded_play, reductions, result, spent, why
+from ddenv.learn.race import (
+    KINDS,
+    Play,
+    Race,
+    bet,
+    plays_of_runs,
+    recorded_play,
+    reductions,
+    result,
+    spent,
+    why,
+)
 from ddenv.learn.shelf import LESSONS
 from ddenv.runfile.store import RunFile
 from tests.learn.lessons import RUNS, opened
@@ -48,7 +59,11 @@ def test_what_algorithms_do_is_recorded_again_to_the_letter(tmp_path):
     before = json.loads(file.read_text())
     file.write_text(json.dumps(before | {"plays": {}}))
     lesson = tmp_path / "1-what-delta-debugging-is.yaml"
-    lesson.write_text(lesson.read_text().replace("[ddmin, ddenv, probdd, splitting]", "[ddmin, timeseg/sequential]"))
+    lesson.write_text(
+        lesson.read_text().replace(
+            "[ddmin, ddenv, probdd, splitting]", "[ddmin, timeseg/sequential]"
+        )
+    )
     _, names = record_plays(lesson)
     after = json.loads(file.read_text())
     assert set(names) == {*before["plays"], "timeseg/sequential"} == set(after["plays"])
@@ -74,7 +89,11 @@ def test_a_recorded_search_that_does_not_fit_is_refused():
 def test_a_run_file_has_the_search_that_was_recorded():
     play = plays_of_runs([DELIVERY])[0]
     with RunFile(DELIVERY) as file:
-        tests = [one.event for one in file.events() if one.kind == "test_started" and one.event.phase == "round"]
+        tests = [
+            one.event
+            for one in file.events()
+            if one.kind == "test_started" and one.event.phase == "round"
+        ]
     assert play.tests == len(tests) == 38
     assert play.left == ("sign", "barrel", "cone") and play.ended
     assert sum(turn.again for turn in play.turns) == sum(each.run > 0 for each in tests)

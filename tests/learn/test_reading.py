@@ -44,7 +44,12 @@ WRONG = [
     ("        right: true\n", "", 11, "expected exactly one answer that is right, found 0"),
     ("misconception: part", "misconception: parts", 16, "use one of part, proof"),
     ("run: delivery.ddenv", "run: ../delivery.ddenv", 3, "is not in the lesson's folder"),
-    ("run: delivery.ddenv", "run: nothing.ddenv", 3, "there is no file 'nothing.ddenv' beside the lesson"),
+    (
+        "run: delivery.ddenv",
+        "run: nothing.ddenv",
+        3,
+        "there is no file 'nothing.ddenv' beside the lesson",
+    ),
     ("steps:", "steps: {}\nmore:", 5, "more: unknown key"),
     ("    ask: What?\n", "", 10, "belongs to a question; the key 'ask' is missing"),
     ("Now.", "The {smallest} of all.", 8, "needs an oracle"),
@@ -67,8 +72,18 @@ ALONE = (
 """
 )
 WRONG_ALONE = [
-    ("oracle: delivery.oracle.json\n", "", 19, "steps[3].try: needs the outcome of every part of the world"),
-    ("budget: 12", "budget: 0", 20, "steps[3].try.budget: expected a number from 1 to 600, found '0'"),
+    (
+        "oracle: delivery.oracle.json\n",
+        "",
+        19,
+        "steps[3].try: needs the outcome of every part of the world",
+    ),
+    (
+        "budget: 12",
+        "budget: 0",
+        20,
+        "steps[3].try.budget: expected a number from 1 to 600, found '0'",
+    ),
     ("budget: 12", "tests: 12", 20, "steps[3].try.tests: unknown key; allowed are budget"),
     ("try:\n      budget: 12", "try: 12", 19, "steps[3].try: expected keys such as budget"),
     (
@@ -78,7 +93,12 @@ WRONG_ALONE = [
         "a step has one of ask, foretell, try, race, found foretell and try",
     ),
     ("[ddmin, splitting]", "ddmin", 22, "steps[4].race: expected a list with at least one entry"),
-    ("[ddmin, splitting]", "[ddmin]", 22, "steps[4].race: expected 2 to 4 algorithms or pairs, found 1"),
+    (
+        "[ddmin, splitting]",
+        "[ddmin]",
+        22,
+        "steps[4].race: expected 2 to 4 algorithms or pairs, found 1",
+    ),
     ("[ddmin, splitting]", "[ddmin, ddmin]", 22, "steps[4].race[2]: 'ddmin' appears twice"),
     (
         "[ddmin, splitting]",
@@ -114,14 +134,18 @@ def test_a_search_needs_an_oracle_in_which_the_whole_world_fails(tmp_path):
     file = lesson(tmp_path, ALONE.partition("  - text: Look.")[0])
     oracle = tmp_path / "delivery.oracle.json"
     oracle.write_text(json.dumps(json.loads(oracle.read_text()) | {"outcomes": {}, "plays": {}}))
-    with pytest.raises(UserError, match="f does not show with all models, so there is nothing to search"):
+    with pytest.raises(
+        UserError, match="f does not show with all models, so there is nothing to search"
+    ):
         open_lesson(file)
 
 
 MISTAKES = [(GOOD, *each) for each in WRONG] + [(ALONE, *each) for each in WRONG_ALONE]
 
 
-@pytest.mark.parametrize(("good", "old", "new", "line", "words"), MISTAKES, ids=[each[4][:40] for each in MISTAKES])
+@pytest.mark.parametrize(
+    ("good", "old", "new", "line", "words"), MISTAKES, ids=[each[4][:40] for each in MISTAKES]
+)
 def test_a_mistake_is_one_line_with_its_place(tmp_path, good, old, new, line, words):
     assert old in good
     file = lesson(tmp_path, good.replace(old, new, 1))

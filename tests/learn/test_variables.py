@@ -18,7 +18,9 @@ def test_variables_say_what_is_so_and_what_changed(run):
         now = {one.name: one for one in variables(moment)}
         state = moment.after
         assert now["E"].value.startswith(f"{len(state.environment)} model")
-        assert now["n_partitions"].value == ("" if state.round is None else str(state.round.n_partitions))
+        assert now["n_partitions"].value == (
+            "" if state.round is None else str(state.round.n_partitions)
+        )
         if before is not None:
             assert now["E"].changed == (now["E"].value != before["E"].value)
         kind, event = moment.recorded.kind, moment.recorded.event
@@ -27,6 +29,8 @@ def test_variables_say_what_is_so_and_what_changed(run):
             assert "[" in now["subenvironments"].value
         if kind == "test_finished" and state.tests[event.test - 1].phase == "round":
             outcome = state.tests[event.test - 1].outcome
-            wanted = {"similar": "f again", "pass": "the goal was reached", "other": "not f"}[outcome]
+            wanted = {"similar": "f again", "pass": "the goal was reached", "other": "not f"}[
+                outcome
+            ]
             assert now["result"].value.startswith(wanted)
         before = now

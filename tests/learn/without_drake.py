@@ -24,7 +24,9 @@ TOY, REAL = LESSONS / "delivery.ddenv", LESSONS / "ditch.ddenv"
 
 
 async def main() -> None:
-    async with Workbench(first=lambda: LessonsScreen(bundled()[0])).run_test(size=(120, 36)) as pilot:
+    async with Workbench(first=lambda: LessonsScreen(bundled()[0])).run_test(
+        size=(120, 36)
+    ) as pilot:
         await shown(pilot)
         await pilot.press("enter", "enter", "s", "right")
         assert isinstance(pilot.app.screen, LessonScreen) and pilot.app.screen.course.step == 2
@@ -36,7 +38,9 @@ async def main() -> None:
         await pilot.press("right_curly_bracket")
         assert len(pilot.app.screen.course.position.now.environment) == 31
     copy(TOY, other := Path(mkdtemp()) / "other.ddenv")
-    async with Workbench(first=lambda: race_of_runs((TOY, other))).run_test(size=(120, 36)) as pilot:
+    async with Workbench(first=lambda: race_of_runs((TOY, other))).run_test(
+        size=(120, 36)
+    ) as pilot:
         await shown(pilot)
         await pilot.press("end")
         assert pilot.app.screen.race.over

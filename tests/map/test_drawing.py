@@ -21,11 +21,16 @@ def test_copies_of_a_model_stay_apart():
     assert shortened("crate", 5) == "crate"
 
 
-@given(st.lists(st.text("ab_", min_size=1, max_size=12), unique=True, max_size=6), st.integers(6, 12))
+@given(
+    st.lists(st.text("ab_", min_size=1, max_size=12), unique=True, max_size=6), st.integers(6, 12)
+)
 def test_names_that_are_cut_are_told_apart_wherever_one_place_of_the_cut_does_that(names, columns):
     cut = told_apart(tuple(names), columns)
     assert all(width(text) <= columns for text in cut.values())
-    apart = [len({shortened(name, columns, head) for name in names}) == len(names) for head in (None, *range(columns))]
+    apart = [
+        len({shortened(name, columns, head) for name in names}) == len(names)
+        for head in (None, *range(columns))
+    ]
     assert (len(set(cut.values())) == len(names)) == any(apart)
 
 
@@ -50,7 +55,11 @@ def test_a_step_is_round_and_not_too_small(span, most):
 
 @pytest.mark.parametrize(
     ("low", "high", "step", "texts"),
-    [(-1, 1, 0.5, ["-1.0", "-0.5", "0.0", "0.5", "1.0"]), (3, 21, 5, ["5", "10", "15", "20"]), (0.1, 0.3, 1, [])],
+    [
+        (-1, 1, 0.5, ["-1.0", "-0.5", "0.0", "0.5", "1.0"]),
+        (3, 21, 5, ["5", "10", "15", "20"]),
+        (0.1, 0.3, 1, []),
+    ],
 )
 def test_numbers_along_an_axis(low, high, step, texts):
     assert [tick_text(value, step) for value in ticks(low, high, step)] == texts

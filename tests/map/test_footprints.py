@@ -10,7 +10,19 @@ from hypothesis import strategies as st
 from ddenv.map.drawing import Frame, path_of
 from ddenv.map.footprints import DYNAMIC, ROUND, STATIC, footprint, footprints, plan
 from ddenv.world.extent import polygon_area, shape_bounds
-from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Link, Mesh, Model, Plane, Shape, Sphere
+from ddenv.world.model import (
+    Box,
+    Capsule,
+    Collision,
+    Cylinder,
+    Ellipsoid,
+    Link,
+    Mesh,
+    Model,
+    Plane,
+    Shape,
+    Sphere,
+)
 from ddenv.world.pose import Pose
 from tests.map.worlds import GROUND, box, world_of
 
@@ -28,7 +40,18 @@ angle = st.floats(-3, 3)
 
 def print_of(shape: Shape, pose: Pose = Pose(), corners: int = ROUND):  # noqa: B008
     collisions = (Collision(name="c", shape=shape, pose=pose, mu=1.0),)
-    return footprint(Model(name="m", pose=Pose((4, 5, 6)), static=True, links=(Link(name="l", pose=Pose(), inertia=None, collisions=collisions, visuals=()),), joints=(), spans=(), line=1), corners)
+    return footprint(
+        Model(
+            name="m",
+            pose=Pose((4, 5, 6)),
+            static=True,
+            links=(Link(name="l", pose=Pose(), inertia=None, collisions=collisions, visuals=()),),
+            joints=(),
+            spans=(),
+            line=1,
+        ),
+        corners,
+    )
 
 
 @given(st.sampled_from(SHAPES), st.builds(Pose.from_rpy, angle, angle, angle, angle, angle, angle))
@@ -64,8 +87,16 @@ def test_a_model_without_shapes_is_a_point():
 
 def test_a_model_that_moved_and_tipped_over_covers_what_it_lies_on():
     upright = Pose((1.0, 0.0, 1.0))
-    link = Link(name="link", pose=upright, inertia=None, collisions=(Collision(name="post", shape=Box((0.2, 0.2, 2.0)), pose=upright, mu=1.0),), visuals=())
-    model = Model(name="post", pose=upright, static=False, links=(link,), joints=(), spans=(), line=1)
+    link = Link(
+        name="link",
+        pose=upright,
+        inertia=None,
+        collisions=(Collision(name="post", shape=Box((0.2, 0.2, 2.0)), pose=upright, mu=1.0),),
+        visuals=(),
+    )
+    model = Model(
+        name="post", pose=upright, static=False, links=(link,), joints=(), spans=(), line=1
+    )
     there = Pose.from_rpy(4.0, 0.0, 0.1, 0.0, math.pi / 2, 0.0)
     moved = footprint(model, moved=there @ model.links[0].pose.inverse())
     assert (*moved.low, *moved.high) == pytest.approx((3.0, -0.1, 5.0, 0.1), abs=1e-6)
@@ -76,7 +107,10 @@ def drawn(*models: str):
 
 
 def test_what_lies_on_top_is_drawn_later():
-    names = [each.model.name for each in drawn(box("lid", 0, 0, z=2), box("crate", 0, 0), box("shelf", 0, 0, z=1))]
+    names = [
+        each.model.name
+        for each in drawn(box("lid", 0, 0, z=2), box("crate", 0, 0), box("shelf", 0, 0, z=1))
+    ]
     assert names == ["crate", "shelf", "lid"]
 
 
@@ -104,7 +138,12 @@ def house(*walls: str) -> str:
 
 
 HOUSE = house(
-    "-3 0 1 0.2 6 2", "3 0 1 0.2 6 2", "0 3 1 6 0.2 2", "-2 -3 1 2 0.2 2", "2 -3 1 2 0.2 2", "0 -3 1.8 2 0.2 0.4"
+    "-3 0 1 0.2 6 2",
+    "3 0 1 0.2 6 2",
+    "0 3 1 6 0.2 2",
+    "-2 -3 1 2 0.2 2",
+    "2 -3 1 2 0.2 2",
+    "0 -3 1.8 2 0.2 0.4",
 )
 
 
@@ -120,20 +159,29 @@ def test_a_building_is_its_walls_with_its_doors_open_and_what_hangs_is_a_point()
     assert models["lamp"].outline.polygons == ()
     assert models["lamp"].size == pytest.approx((1.2, 0.8, 0.3))
     # Above a trench the ground is what is beside it.
-    raised = {each.model.name: each for each in drawn(box("quay", 0, 0, size=(6, 6, 2)), box("tile", 0, 0, z=2))}
+    raised = {
+        each.model.name: each
+        for each in drawn(box("quay", 0, 0, size=(6, 6, 2)), box("tile", 0, 0, z=2))
+    }
     assert raised["tile"].outline.polygons
     # One outline around it would close it.
-    frame = Frame.around(list(models.values()), [], 0.1, 2.0, (800.0, 600.0), (0.0, 0.0), (0.0, 0.0))
+    frame = Frame.around(
+        list(models.values()), [], 0.1, 2.0, (800.0, 600.0), (0.0, 0.0), (0.0, 0.0)
+    )
     assert path_of(walls, frame, coarse=True) == path_of(walls, frame)
     assert [each.name for each in footprints(world_of(GROUND, HOUSE, floor))] == ["floor", "house"]
 
 
 def test_of_few_models_none_is_a_floor():
-    assert not any(each.floor for each in drawn(box("hall", 0, 0, size=(50, 50, 1)), box("crate", 0, 0)))
+    assert not any(
+        each.floor for each in drawn(box("hall", 0, 0, size=(50, 50, 1)), box("crate", 0, 0))
+    )
 
 
 def test_colours_are_those_of_the_file_or_else_of_the_kind():
-    glass = box("glass", 2, 0, color="0 0 1 1").replace("<material>", "<transparency>1</transparency><material>")
+    glass = box("glass", 2, 0, color="0 0 1 1").replace(
+        "<material>", "<transparency>1</transparency><material>"
+    )
     models = [box("red", 0, 0, color="1 0 0 1"), glass, box("moves", 4, 0, static=False)]
     assert {each.model.name: each.color for each in drawn(*models)} == {
         "red": (255, 0, 0),

@@ -11,7 +11,18 @@ from hypothesis import strategies as st
 
 from ddenv.map.footprints import Footprint, footprints
 from ddenv.map.paint import Canvas
-from ddenv.map.raster import EMPTY, SHORT, View, arrow, braille, extent, fit, label_cells, masks, owners
+from ddenv.map.raster import (
+    EMPTY,
+    SHORT,
+    View,
+    arrow,
+    braille,
+    extent,
+    fit,
+    label_cells,
+    masks,
+    owners,
+)
 from ddenv.workbench.map.map_colors import mixed
 from ddenv.workbench.map.model_looks import Kept, fill, looks
 from ddenv.world.extent import convex_hull, polygon_area
@@ -43,7 +54,10 @@ def test_small_models_lie_on_top_of_large_ones():
 
 
 def test_the_ground_is_not_drawn():
-    names = [each.name for each in prints_of(GROUND, box("crate", 0, 0), box("floor", 0, 0, size=(15, 8, 0.02)))]
+    names = [
+        each.name
+        for each in prints_of(GROUND, box("crate", 0, 0), box("floor", 0, 0, size=(15, 8, 0.02)))
+    ]
     assert names == ["floor", "crate"]
 
 
@@ -83,7 +97,8 @@ def test_zooming_keeps_the_centre_and_has_an_end():
 
 
 @pytest.mark.parametrize(
-    ("degrees", "sign"), [(0, "→"), (45, "↗"), (90, "↑"), (180, "←"), (-90, "↓"), (-45, "↘"), (359, "→")]
+    ("degrees", "sign"),
+    [(0, "→"), (45, "↗"), (90, "↑"), (180, "←"), (-90, "↓"), (-45, "↘"), (359, "→")],
 )
 def test_arrows_point_where_the_robot_does(degrees, sign):
     half = math.radians(degrees) / 2
@@ -127,7 +142,9 @@ def slowly(each: Footprint, view: View) -> tuple[np.ndarray, np.ndarray]:
                 unsure[row, column] |= bool((abs(beyond) < 1e-6).any())
     # What is smaller than a pixel stays visible.
     boxes = [(polygon.min(axis=0), polygon.max(axis=0)) for polygon in each.polygons]
-    small = [(low + high) / 2 for low, high in boxes if np.hypot(*(high - low)) <= SHORT * view.scale]
+    small = [
+        (low + high) / 2 for low, high in boxes if np.hypot(*(high - low)) <= SHORT * view.scale
+    ]
     for middle in small if each.polygons else [each.center]:
         x, y = view.pixels(np.array([middle]))[0]
         if 0 <= x < view.columns and 0 <= y < 2 * view.rows:
@@ -201,7 +218,9 @@ def test_huge_models_do_not_widen_the_map(shapes, points):
 
 def test_a_building_around_a_short_way_is_seen_whole():
     wall = np.array([[-9.0, -5.0], [9.0, -5.0], [9.0, 5.0], [-9.0, 5.0]])
-    low, high = extent([Footprint("house", (wall,), (-9.0, -5.0), (9.0, 5.0))], [(0.0, 0.0), (1.0, 0.0)])
+    low, high = extent(
+        [Footprint("house", (wall,), (-9.0, -5.0), (9.0, 5.0))], [(0.0, 0.0), (1.0, 0.0)]
+    )
     assert (low.tolist(), high.tolist()) == ([-9.0, -5.0], [9.0, 5.0])
 
 
@@ -220,8 +239,12 @@ DARK = (15, 20, 27), (213, 219, 229)
 
 def wall(length: float, width: float, yaw: float, x: float = 0.0, y: float = 0.0) -> Footprint:
     corners = np.array([(-length, -width), (length, -width), (length, width), (-length, width)]) / 2
-    turned = corners @ np.array([(math.cos(yaw), math.sin(yaw)), (-math.sin(yaw), math.cos(yaw))]) + (x, y)
-    return Footprint("wall", (turned,), tuple(turned.min(axis=0).tolist()), tuple(turned.max(axis=0).tolist()))
+    turned = corners @ np.array(
+        [(math.cos(yaw), math.sin(yaw)), (-math.sin(yaw), math.cos(yaw))]
+    ) + (x, y)
+    return Footprint(
+        "wall", (turned,), tuple(turned.min(axis=0).tolist()), tuple(turned.max(axis=0).tolist())
+    )
 
 
 @given(
@@ -235,7 +258,9 @@ def test_a_thin_wall_is_one_line_from_end_to_end(length, part, yaw, x, y):
     view = View(x=0, y=0, scale=0.5, columns=24, rows=12)
     grid = owners(masks([wall(length, part * view.scale, yaw, x, y)], view), view) != EMPTY
     for away in np.arange(-length / 2 + 0.3, length / 2 - 0.3, 0.2):
-        column, row = view.pixels(np.array([(x + away * math.cos(yaw), y + away * math.sin(yaw))]))[0]
+        column, row = view.pixels(np.array([(x + away * math.cos(yaw), y + away * math.sin(yaw))]))[
+            0
+        ]
         if 1 <= column < 23 and 1 <= row < 23:
             near = grid[int(row) - 1 : int(row) + 2, int(column) - 1 : int(column) + 2]
             assert near.any(), away
@@ -254,12 +279,21 @@ def test_far_and_endless_walls_are_cut_at_the_view():
 def test_a_gap_between_platforms_is_seen_wherever_the_pixels_fall(gap, offset):
     view = View(x=offset, y=0, scale=0.5, columns=24, rows=6)
     sides = [wall(6, 4, 0, x=sign * (3 + gap / 2)) for sign in (-1, 1)]
-    prints = [Footprint(f"side{number}", each.polygons, each.low, each.high) for number, each in enumerate(sides)]
+    prints = [
+        Footprint(f"side{number}", each.polygons, each.low, each.high)
+        for number, each in enumerate(sides)
+    ]
     names = frozenset(each.name for each in prints)
     palette = mixed(*DARK)
-    for who in (Kept(elements=names, environment=names), Kept(elements=frozenset({"other"}), environment=frozenset())):
+    for who in (
+        Kept(elements=names, environment=names),
+        Kept(elements=frozenset({"other"}), environment=frozenset()),
+    ):
         canvas = Canvas(view.rows, view.columns, palette.back)
         fill(canvas, owners(masks(prints, view), view), looks(prints, who, palette))
-        row = [(chr(char), int(back)) for char, back in zip(canvas.chars[3], canvas.back[3], strict=True)]
+        row = [
+            (chr(char), int(back))
+            for char, back in zip(canvas.chars[3], canvas.back[3], strict=True)
+        ]
         inside = row[4:20]
         assert len(set(inside)) > 1, "no seam and no gap"

@@ -28,7 +28,9 @@ def words(tree) -> list[str]:
 
 
 def test_every_model_but_the_ground_has_a_shape_with_its_name_size_and_pose():
-    tree = tree_of(GROUND, box("crate", 1, 2, 0.5, size=(1, 1, 0.4)), box("post", 3, 0, static=False))
+    tree = tree_of(
+        GROUND, box("crate", 1, 2, 0.5, size=(1, 1, 0.4)), box("post", 3, 0, static=False)
+    )
     crate, post = sorted(tooltips(tree))
     assert crate.splitlines() == [
         "crate",
@@ -70,7 +72,9 @@ def test_start_and_goal_are_marked():
 
 def test_a_mark_that_is_far_away_is_on_the_map():
     tree = tree_of(box("a", 0, 0), goal=(50.0, -30.0))
-    (mark,) = [group for group in tree.iter(f"{SVG}g") if "goal" in (group.findtext(f"{SVG}title") or "")]
+    (mark,) = [
+        group for group in tree.iter(f"{SVG}g") if "goal" in (group.findtext(f"{SVG}title") or "")
+    ]
     x, y = map(float, mark.get("transform")[len("translate(") : -1].split())
     assert 0 < x < float(tree.get("width"))
     assert 0 < y < float(tree.get("height"))

@@ -53,12 +53,18 @@ class World:
 
     def rate_in(self, environment: Environment) -> float:
         """The true rate of f."""
-        return self.rate * self.factor ** len(self.useful - environment) if self.needed <= environment else 0.0
+        return (
+            self.rate * self.factor ** len(self.useful - environment)
+            if self.needed <= environment
+            else 0.0
+        )
 
     def outcome(self, environment: Environment, run: int) -> bool | str:
         """Of a run, the same whenever it is made."""
         draw = random.Random(f"{self.seed} {environment.bits} {run}")
-        return "broken" if draw.random() < self.breaks else draw.random() < self.rate_in(environment)
+        return (
+            "broken" if draw.random() < self.breaks else draw.random() < self.rate_in(environment)
+        )
 
 
 @dataclass
@@ -96,7 +102,9 @@ class Driver:
     At a step `interrupt` raises an exception, (step, exception).
     """
 
-    def __init__(self, world: World, workers: int = 1, order: int = 0, known: Known | None = None) -> None:
+    def __init__(
+        self, world: World, workers: int = 1, order: int = 0, known: Known | None = None
+    ) -> None:
         self.world, self.workers, self.refusals = world, workers, 0
         self.outcome: Callable[[Environment, int], bool | str] = world.outcome
         self.known, self.now = known or Known(), Now((world.whole,))
@@ -148,18 +156,38 @@ class Driver:
             proves=leg.rule.proves,
         )
         inside = tuple(first for first, stack in stacks.by_first.items() if stack <= leg.chain[-1])
-        return stacks.expand(tried_again(inside, leg.again, lambda left: search(self.world.algorithm, left, guide)))
+        return stacks.expand(
+            tried_again(inside, leg.again, lambda left: search(self.world.algorithm, left, guide))
+        )
 
     def leg(self, again=()):
         """The next search, from what is left."""
         pinned = NOTHING if self.world.pinned is None else self.world.stack(self.world.pinned)
         labels = dict.fromkeys(self.world.labels)
-        groups = Stacks.of(stack for label in labels if not (stack := self.world.stack(label)) <= pinned)
-        free = {model: stack for model, stack in groups.by_first.items() if stack <= self.now.chain[-1]}
+        groups = Stacks.of(
+            stack for label in labels if not (stack := self.world.stack(label)) <= pinned
+        )
+        free = {
+            model: stack for model, stack in groups.by_first.items() if stack <= self.now.chain[-1]
+        }
         rate = self.rate() if self.world.keeps_rate else 0.0
-        rule = Acceptance(most_misses=1 + self.world.iterations, rate=rate, keep_rate=0.8, steps_back=len(self.now.lost))
+        rule = Acceptance(
+            most_misses=1 + self.world.iterations,
+            rate=rate,
+            keep_rate=0.8,
+            steps_back=len(self.now.lost),
+        )
         n_partitions = self.now.n_partitions.get(self.now.chain[-1])
-        leg = Leg(first_round=self.now.round + 1, whole=self.world.whole, chain=self.now.chain, pinned=pinned, free=free, rule=rule, n_partitions=n_partitions, again=tuple(again))
+        leg = Leg(
+            first_round=self.now.round + 1,
+            whole=self.world.whole,
+            chain=self.now.chain,
+            pinned=pinned,
+            free=free,
+            rule=rule,
+            n_partitions=n_partitions,
+            again=tuple(again),
+        )
         self.legs.append((leg, deepcopy(self.now), len(self.facts)))
         return leg
 
@@ -199,11 +227,15 @@ class Driver:
             if test.why == "round":
                 candidate = self._round.candidates[test.candidate]
                 assert test.environment == candidate.models | self.legs[-1][0].pinned
-        self._running += [test for test in wanted if test not in self._running][: self.workers - len(self._running)]
+        self._running += [test for test in wanted if test not in self._running][
+            : self.workers - len(self._running)
+        ]
         for _ in range(self._order.randint(1, len(self._running))):
             test = self._running.pop(self._order.randrange(len(self._running)))
             self.made.append(test)
-            self.known.outcomes[test.environment, test.run] = self.outcome(test.environment, test.run)
+            self.known.outcomes[test.environment, test.run] = self.outcome(
+                test.environment, test.run
+            )
 
     def baseline_ran(self, runs, chose):
         self._step("baseline_ran", runs, chose)
@@ -247,7 +279,12 @@ class Driver:
     def certificate_due(self):
         self._step("certificate_due")
         self.now.certificates += 1
-        terms = Terms(certify_rate=2 / 3, keep_rate=0.8, error=error_of(self.now.certificates), at_least=self.world.baseline_runs)
+        terms = Terms(
+            certify_rate=2 / 3,
+            keep_rate=0.8,
+            error=error_of(self.now.certificates),
+            at_least=self.world.baseline_runs,
+        )
         return Certificate(FIRST_FRESH + EACH_CERTIFICATE * self.now.certificates, terms)
 
     def certified(self, made):

@@ -28,10 +28,15 @@ OPTIONS = st.fixed_dictionaries(
 )
 # Every pair with the paper's algorithm; the others look at less of it.
 SEARCHES = [("ddenv", pair) for pair in PAIRS] + [
-    (algorithm, pair) for algorithm in ALGORITHMS if algorithm != "ddenv" for pair in (PAIRS[0], PAIRS[-1])
+    (algorithm, pair)
+    for algorithm in ALGORITHMS
+    if algorithm != "ddenv"
+    for pair in (PAIRS[0], PAIRS[-1])
 ]
 every_search = pytest.mark.parametrize(
-    ("algorithm", "pair"), SEARCHES, ids=[f"{algorithm}-{'/'.join(pair)}" for algorithm, pair in SEARCHES]
+    ("algorithm", "pair"),
+    SEARCHES,
+    ids=[f"{algorithm}-{'/'.join(pair)}" for algorithm, pair in SEARCHES],
 )
 
 
@@ -52,7 +57,9 @@ def test_a_monotone_oracle_leaves_exactly_the_needed_models(algorithm, pair, wor
 @every_search
 @given(world=worlds, salt=st.integers(0, 10**6), options=OPTIONS)
 @examples(0.2)
-def test_any_deterministic_oracle_leaves_a_one_minimal_environment(algorithm, pair, world, salt, options):
+def test_any_deterministic_oracle_leaves_a_one_minimal_environment(
+    algorithm, pair, world, salt, options
+):
     count, _, seed = world
     is_similar = any_oracle(salt)
     kept, _ = run(evidence(count, seed), is_similar, pair, algorithm, **options)
@@ -62,7 +69,9 @@ def test_any_deterministic_oracle_leaves_a_one_minimal_environment(algorithm, pa
 @every_search
 @given(world=worlds, salt=st.integers(0, 10**6), options=OPTIONS)
 @examples(0.1)
-def test_partitions_are_disjoint_not_empty_and_cover_the_environment(algorithm, pair, world, salt, options):
+def test_partitions_are_disjoint_not_empty_and_cover_the_environment(
+    algorithm, pair, world, salt, options
+):
     count, _, seed = world
     for round, _ in run(evidence(count, seed), any_oracle(salt), pair, algorithm, **options)[1]:
         models = [model for partition in round.partitions for model in partition]
@@ -118,7 +127,9 @@ def test_nothing_is_implied_by_tests_that_broke():
     known = evidence(8, 1)
 
     def second_round(broke):
-        guide = make_guide("model2model", "failure-proximal", lambda: known, skip="implied", growth="steady")
+        guide = make_guide(
+            "model2model", "failure-proximal", lambda: known, skip="implied", growth="steady"
+        )
         searching = search("ddenv", range(8), replace(guide, broke=lambda candidate: broke))
         return [one.models for one in list(_rounds(searching))[1].candidates]
 
@@ -151,7 +162,10 @@ def test_an_algorithm_uses_the_parts_of_the_pair_that_it_is_said_to_use(algorith
         used.add("prioritization")
         return guide.rank(partitions)
 
-    carried_through(search(algorithm, range(9), replace(guide, split=split, rank=rank)), Environment.of((1, 7)).__le__)
+    carried_through(
+        search(algorithm, range(9), replace(guide, split=split, rank=rank)),
+        Environment.of((1, 7)).__le__,
+    )
     assert used == set(uses(algorithm))
 
 
@@ -163,7 +177,12 @@ def test_many_needed_models_far_apart_take_ddenv_little_more_than_splitting_and_
 
     def tests(**options):
         found = ddenv.reduce(
-            elements, needed.issubset, positions=places, failure_pose=(10, 10, 0), accept_rate="first", **options
+            elements,
+            needed.issubset,
+            positions=places,
+            failure_pose=(10, 10, 0),
+            accept_rate="first",
+            **options,
         )
         assert frozenset(found.kept) == needed
         return found.search_tests

@@ -19,7 +19,11 @@ from tests.reduction.worlds import carried_through, tried
 from tests.tiers import examples
 
 MODELS = tuple(range(12))
-groups = st.lists(st.sets(st.sampled_from(MODELS), min_size=1, max_size=4).map(Environment.of), min_size=1, max_size=4)
+groups = st.lists(
+    st.sets(st.sampled_from(MODELS), min_size=1, max_size=4).map(Environment.of),
+    min_size=1,
+    max_size=4,
+)
 
 
 def search(searching, passing):
@@ -104,12 +108,24 @@ def isolated(world, passing, rates=(1.0, 0.0), checks=(), **options):
     def reached(environment, run):
         draw = random.Random(f"{world.seed} {environment.bits} {run}")
         return (
-            "broken" if draw.random() < world.breaks else draw.random() < rates[not passing(world.whole - environment)]
+            "broken"
+            if draw.random() < world.breaks
+            else draw.random() < rates[not passing(world.whole - environment)]
         )
 
     driver.outcome = reached
     stacks = Stacks.of(world.stack(label) for label in dict.fromkeys(world.labels))
-    asked = Asked(whole=world.whole, suspects=stacks.representatives[::-1], stacks=stacks, size=1, rule=Passing.of(0, 10), keep_rate=0.8, at_least=5, first_run=10_000, block=1_000)
+    asked = Asked(
+        whole=world.whole,
+        suspects=stacks.representatives[::-1],
+        stacks=stacks,
+        size=1,
+        rule=Passing.of(0, 10),
+        keep_rate=0.8,
+        at_least=5,
+        first_run=10_000,
+        block=1_000,
+    )
     return driver, driver.drive(isolation(driver, asked, checks)), stacks
 
 
@@ -122,7 +138,9 @@ isolations = st.builds(
     seed=st.integers(0, 10**6),
     breaks=st.sampled_from([0.0, 0.02]),
 )
-causes = st.lists(st.sets(st.integers(0, 7), min_size=1, max_size=3).map(Environment.of), min_size=1, max_size=3)
+causes = st.lists(
+    st.sets(st.integers(0, 7), min_size=1, max_size=3).map(Environment.of), min_size=1, max_size=3
+)
 
 
 @given(world=isolations.map(lambda world: replace(world, breaks=0.0)), causes=causes)
@@ -143,12 +161,16 @@ def test_fresh_runs_show_that_what_goes_is_enough_and_each_of_it_needed(world, c
 
 
 @given(world=isolations, causes=causes, workers=st.integers(2, 9))
-def test_an_isolation_does_not_depend_on_what_ends_first_and_is_taken_up_again(world, causes, workers):
+def test_an_isolation_does_not_depend_on_what_ends_first_and_is_taken_up_again(
+    world, causes, workers
+):
     passing, rates = hits(causes), (0.97, 0.1)
     alone, removed, _ = isolated(world, passing, rates)
     together, same, _ = isolated(world, passing, rates, workers=workers, order=1)
     assert (together.facts, same) == (alone.facts, removed)
     checks = [fact[1] for fact in alone.facts if fact[0] == "checked"]
     for known in range(len(checks) + 1):
-        again, same, _ = isolated(world, passing, rates, checks[:known], known=Known(dict(alone.known.outcomes)))
+        again, same, _ = isolated(
+            world, passing, rates, checks[:known], known=Known(dict(alone.known.outcomes))
+        )
         assert (again.made, same) == ([], removed)

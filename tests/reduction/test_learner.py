@@ -55,13 +55,22 @@ def test_a_test_that_may_have_missed_f_says_less():
 
 
 def test_of_nested_groups_the_smallest_speak():
-    groups = np.array([[1, 1, 1, 0], [1, 1, 0, 0], [0, 0, 1, 1], [1, 1, 0, 0], [0, 0, 0, 0]], dtype=bool)
+    groups = np.array(
+        [[1, 1, 1, 0], [1, 1, 0, 0], [0, 0, 1, 1], [1, 1, 0, 0], [0, 0, 0, 0]], dtype=bool
+    )
     assert undominated(groups).tolist() == [1, 2]
 
 
 def test_with_no_test_yet_the_near_ones_are_likely():
-    positions = {name: (float(x), 0.0, 0.0) for name, x in zip("abcde", (8, 1, 3, 20, 5), strict=True)}
-    known = Evidence(elements=tuple("abcde"), positions=positions, trajectory=np.array([[0.0, 9, 0, 0, 0], [1, 0, 0, 0, 0]]), failure_position=(0.0, 0.0, 0.0))
+    positions = {
+        name: (float(x), 0.0, 0.0) for name, x in zip("abcde", (8, 1, 3, 20, 5), strict=True)
+    }
+    known = Evidence(
+        elements=tuple("abcde"),
+        positions=positions,
+        trajectory=np.array([[0.0, 9, 0, 0, 0], [1, 0, 0, 0, 0]]),
+        failure_position=(0.0, 0.0, 0.0),
+    )
     chances = Learner().chances(known.elements, known)
     assert "".join(known.elements[index] for index in np.argsort(-chances)) == "bcead"
     assert np.array_equal(chances, spatial_prior(known.elements, known))
@@ -70,7 +79,11 @@ def test_with_no_test_yet_the_near_ones_are_likely():
 def test_a_large_model_is_near_where_its_box_may_be():
     positions = {"hill": (6.0, 0.0, 0.0), "stone": (4.0, 0.0, 0.0)}
     known = Evidence(
-        elements=("hill", "stone"), positions=positions, trajectory=None, failure_position=(0.0, 0.0, 0.0), traits={"hill": Traits(10), "stone": Traits(1)}
+        elements=("hill", "stone"),
+        positions=positions,
+        trajectory=None,
+        failure_position=(0.0, 0.0, 0.0),
+        traits={"hill": Traits(10), "stone": Traits(1)},
     )
     assert spatial_prior(("hill", "stone"), known)[0] > spatial_prior(("hill", "stone"), known)[1]
 
@@ -90,9 +103,18 @@ def test_it_learns_what_needed_models_are_like():
     left = tuple(name for name in elements if name in slippery or name not in elements[:20])
     learner = Learner()
     for made in range(1, len(trials) + 1):
-        gone = {next(iter(set(elements) - trial.models)) for trial in trials[:made] if trial.similar}
+        gone = {
+            next(iter(set(elements) - trial.models)) for trial in trials[:made] if trial.similar
+        }
         there = tuple(name for name in elements if name not in gone)
-        known = Evidence(elements=elements, positions=positions, trajectory=None, failure_position=(0.0, 0.0, 0.0), traits=traits, trials=trials[:made])
+        known = Evidence(
+            elements=elements,
+            positions=positions,
+            trajectory=None,
+            failure_position=(0.0, 0.0, 0.0),
+            traits=traits,
+            trials=trials[:made],
+        )
         chances = learner.chances(there, known)
     assert there == left
     new = [index for index, name in enumerate(left) if name not in elements[:20]]
@@ -110,12 +132,18 @@ def followed(weights):
     for seed in range(60):
         known = evidence(30, seed)
         end = known.failure_position
-        near = sorted(known.elements, key=lambda name: np.linalg.norm(np.subtract(known.positions[name], end)))
+        near = sorted(
+            known.elements, key=lambda name: np.linalg.norm(np.subtract(known.positions[name], end))
+        )
         ranks = np.random.default_rng(seed).choice(30, 3, replace=False, p=weights / weights.sum())
         needed = Environment.of(known.elements.index(near[rank]) for rank in ranks)
         learner, trials = Learner(), []
         guide = make_guide(
-            "model2model", "failure-proximal", lambda known=known: known, growth="steady", skip="implied"
+            "model2model",
+            "failure-proximal",
+            lambda known=known: known,
+            growth="steady",
+            skip="implied",
         )
         searching, winner = search("ddenv", range(30), guide), None
         for _ in range(8):
@@ -127,7 +155,9 @@ def followed(weights):
             at_first += spatial_prior(there, known).tolist()
             truth += [model in needed for model in round.environment]
             winner = next((one for one in round.candidates if needed <= one.models), None)
-            trials += [Trial(one.models, one is winner, known.elements) for one in tried(round, winner)]
+            trials += [
+                Trial(one.models, one is winner, known.elements) for one in tried(round, winner)
+            ]
     return np.array(learnt), np.array(at_first), np.array(truth)
 
 
@@ -143,7 +173,9 @@ def test_its_chances_are_right_on_average():
 
 @pytest.mark.rates
 @pytest.mark.parametrize(
-    "weights", [1.0 / np.arange(1, 31), np.ones(30), np.arange(30) < 12], ids=["near", "any", "ring"]
+    "weights",
+    [1.0 / np.arange(1, 31), np.ones(30), np.arange(30) < 12],
+    ids=["near", "any", "ring"],
 )
 def test_wherever_the_needed_models_are_it_does_better_than_nearness_alone(weights):
     learnt, at_first, needed = followed(np.array(weights, dtype=float))
@@ -163,5 +195,8 @@ def test_likely_models_stand_in_small_partitions():
     unlikely = min(partitions, key=lambda part: np.mean([chances[name] for name in part]))
     assert len(unlikely) > 3 * len(likely)
     # Like chances stand together: the partitions do not overlap in them.
-    spans = sorted((min(chances[name] for name in part), max(chances[name] for name in part)) for part in partitions)
+    spans = sorted(
+        (min(chances[name] for name in part), max(chances[name] for name in part))
+        for part in partitions
+    )
     assert all(high <= low for (_, high), (low, _) in pairwise(spans))

@@ -45,7 +45,9 @@ def driven(world, **options):
 
 
 @given(world=worlds, workers=st.integers(2, 9), order=st.integers(0, 10**6))
-def test_whatever_ends_first_and_however_many_run_all_that_is_found_is_the_same(world, workers, order):
+def test_whatever_ends_first_and_however_many_run_all_that_is_found_is_the_same(
+    world, workers, order
+):
     alone, end = driven(world)
     together, same = driven(world, workers=workers, order=order)
     assert together.facts == alone.facts
@@ -160,7 +162,9 @@ def test_nothing_that_lost_the_rate_is_taken_again(world):
         match fact:
             case ("failure_fixed", times):
                 of_whole |= {run: world.outcome(world.whole, run) for run in range(times)}
-            case ("judged", _, environment, verdict, times) if any(environment <= one for one in lost):
+            case ("judged", _, environment, verdict, times) if any(
+                environment <= one for one in lost
+            ):
                 assert (verdict, times) == ("missed", 0)
             case ("similar" | "left_out", *_, environment):
                 assert not any(environment <= one for one in lost)
@@ -187,18 +191,37 @@ def place(world, chain, certified, rate):
         return world.outcome(environment, first + run)
 
     lost_rate = sum(fresh(chain[-1], run) for run in lost) / len(lost)
-    return last_good(chain, lambda environment: settle(good_enough(environment, rate, 0.8, lost_rate), fresh))
+    return last_good(
+        chain, lambda environment: settle(good_enough(environment, rate, 0.8, lost_rate), fresh)
+    )
 
 
 def test_the_worlds_of_these_tests_come_to_all_steps():
     """Else they would prove little."""
     seen, ends = set(), set()
     for seed in range(8):
-        world = World(tuple(range(5)), Environment.of([0]), Environment.of([2, 4]), "ddmin", seed, 0.8, iterations=0)
+        world = World(
+            tuple(range(5)),
+            Environment.of([0]),
+            Environment.of([2, 4]),
+            "ddmin",
+            seed,
+            0.8,
+            iterations=0,
+        )
         driver, end = driven(world, workers=8)
         seen |= {fact[0] for fact in driver.facts}
         ends |= {claim.claim.verdict for claim in end.claims} if end else set()
-    told = {"round_began", "judged", "similar", "round_ended", "search_ended", "certified", "stepped_back", "left_out"}
+    told = {
+        "round_began",
+        "judged",
+        "similar",
+        "round_ended",
+        "search_ended",
+        "certified",
+        "stepped_back",
+        "left_out",
+    }
     assert seen >= told
     assert ends >= {"kept", "needed"}
 
@@ -215,7 +238,14 @@ def certified_alone(world, vetoed=()):
     driver.algorithm = lambda leg: nothing(leg.chain[-1], None)
     driver.vetoed = {world.whole - Environment.of([model]) for model in vetoed}
     free = {model: Environment.of([model]) for model in world.whole}
-    leg = Leg(first_round=1, whole=world.whole, chain=(world.whole,), pinned=Environment(), free=free, rule=Acceptance(most_misses=1))
+    leg = Leg(
+        first_round=1,
+        whole=world.whole,
+        chain=(world.whole,),
+        pinned=Environment(),
+        free=free,
+        rule=Acceptance(most_misses=1),
+    )
     driver.drive(begun(driver, leg), most=2000)
     return [fact[1] for fact in driver.facts if fact[0] == "left_out"]
 

@@ -45,7 +45,12 @@ def needs(*needed):
 @pytest.mark.parametrize("prioritization", names("prioritization"))
 def test_every_combination_finds_the_needed_ones(algorithm, partitioning, prioritization):
     found = ddenv.reduce(
-        ELEMENTS, needs("b", "g"), algorithm=algorithm, partitioning=partitioning, prioritization=prioritization, **ALL
+        ELEMENTS,
+        needs("b", "g"),
+        algorithm=algorithm,
+        partitioning=partitioning,
+        prioritization=prioritization,
+        **ALL,
     )
     assert found.kept == ("b", "g")
 
@@ -88,7 +93,9 @@ def test_a_failure_that_shows_in_four_of_five_runs_is_never_lost_and_minimal_is_
     assert not found.minimal or found.kept == ("b", "g")
 
 
-@pytest.mark.parametrize("options", [{}, {"iterations": 3}, {"iterations": 3, "accept_rate": "first"}])
+@pytest.mark.parametrize(
+    "options", [{}, {"iterations": 3}, {"iterations": 3, "accept_rate": "first"}]
+)
 def test_a_world_that_does_not_fail_is_refused(options):
     with pytest.raises(ddenv.UserError, match="does not show with all elements"):
         ddenv.reduce(ELEMENTS, lambda _: False, algorithm="ddmin", **options)
@@ -112,7 +119,11 @@ def test_the_rate_is_kept_and_each_claim_says_what_its_fresh_runs_showed(salt, a
     found = ddenv.reduce(ELEMENTS, counted, algorithm=algorithm, accept_rate="kept", **ALL)
     assert found.kept == ("b", "c", "g")
     assert found.minimal
-    assert found.tests == len(made) == found.baseline_tests + found.search_tests + found.certificate_tests
+    assert (
+        found.tests
+        == len(made)
+        == found.baseline_tests + found.search_tests + found.certificate_tests
+    )
     assert [(claim.without, claim.verdict) for claim in found.claims] == [
         (None, "kept"),
         ("b", "needed"),
@@ -122,7 +133,9 @@ def test_the_rate_is_kept_and_each_claim_says_what_its_fresh_runs_showed(salt, a
     assert set(found.history[-1].kept) >= set(found.kept)
     fresh = made[-found.certificate_tests :]
     for claim in found.claims:
-        shown = [result for kept, result in fresh if kept == frozenset(found.kept) - {claim.without}][-claim.runs :]
+        shown = [
+            result for kept, result in fresh if kept == frozenset(found.kept) - {claim.without}
+        ][-claim.runs :]
         assert (claim.shown, claim.runs) == (sum(shown), len(shown))
         assert claim.low <= claim.shown / claim.runs <= claim.high
 
@@ -133,7 +146,11 @@ def test_the_certificate_calls_each_world_once_in_a_block_and_draws_the_order():
     for seed in range(8):
         made = []
         found = ddenv.reduce(
-            ELEMENTS, lambda kept, made=made: made.append(kept) or kept >= needed, iterations=3, seed=seed, **ALL
+            ELEMENTS,
+            lambda kept, made=made: made.append(kept) or kept >= needed,
+            iterations=3,
+            seed=seed,
+            **ALL,
         )
         assert found.minimal
         fresh = made[-found.certificate_tests :]
@@ -146,7 +163,11 @@ def test_the_certificate_calls_each_world_once_in_a_block_and_draws_the_order():
         assert all(frozenset(needed) in block for block in blocks)
         first.update(block[0] for block in blocks)
         assert found == ddenv.reduce(ELEMENTS, needs(*needed), iterations=3, seed=seed, **ALL)
-    assert first == {frozenset(ELEMENTS), frozenset(needed), *(frozenset(needed - {name}) for name in needed)}
+    assert first == {
+        frozenset(ELEMENTS),
+        frozenset(needed),
+        *(frozenset(needed - {name}) for name in needed),
+    }
 
 
 @cache
@@ -155,7 +176,11 @@ def stepping_back(salt):
     rounds, options = [], {"skip": "known", "accept_rate": "kept"}
     found = ddenv.reduce(ELEMENTS, drifting(salt), on_round=rounds.append, **options, **ALL)
     steps = zip(found.history, found.history[1:], strict=False)
-    return found, rounds, [after.kept for before, after in steps if set(after.kept) > set(before.kept)]
+    return (
+        found,
+        rounds,
+        [after.kept for before, after in steps if set(after.kept) > set(before.kept)],
+    )
 
 
 def test_after_a_certificate_the_chosen_algorithm_goes_on_with_the_n_that_it_had():
@@ -163,7 +188,9 @@ def test_after_a_certificate_the_chosen_algorithm_goes_on_with_the_n_that_it_had
     again = 0
     for salt in range(20):
         _, rounds, reached = stepping_back(salt)
-        assert all(len(one.candidates) == 1 or one.candidates[0][0] == "partition" for one in rounds)
+        assert all(
+            len(one.candidates) == 1 or one.candidates[0][0] == "partition" for one in rounds
+        )
         for environment in reached:
             there = [one for one in rounds if one.environment == environment]
             # What leaves out again has two parts: the group and the rest.
@@ -194,7 +221,10 @@ def test_what_lost_the_rate_is_not_taken_again():
 def line_of(count):
     """A world of so many models on a line at whose end the robot fails."""
     path = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [10.0, count, 0.0, 0.0, 0.0]])
-    return {"positions": {f"m{index}": (float(index), 0.0, 0.0) for index in range(count)}, "trajectory": path}
+    return {
+        "positions": {f"m{index}": (float(index), 0.0, 0.0) for index in range(count)},
+        "trajectory": path,
+    }
 
 
 def test_splitting_looks_once_where_the_failure_is_flaky_and_confirms_the_end():
@@ -217,12 +247,18 @@ def test_splitting_looks_once_where_the_failure_is_flaky_and_confirms_the_end():
 
 
 def test_the_papers_rule_is_content_with_a_rarer_failure_and_claims_nothing():
-    ends = [ddenv.reduce(ELEMENTS, drifting(salt), iterations=3, accept_rate="first", **ALL) for salt in range(20)]
+    ends = [
+        ddenv.reduce(ELEMENTS, drifting(salt), iterations=3, accept_rate="first", **ALL)
+        for salt in range(20)
+    ]
     assert any(found.kept != ("b", "c", "g") for found in ends)
     assert all(not found.claims and not found.certificate_tests for found in ends)
 
 
-@given(needed=st.sets(st.sampled_from(ELEMENTS), min_size=1), algorithm=st.sampled_from(names("algorithm")))
+@given(
+    needed=st.sets(st.sampled_from(ELEMENTS), min_size=1),
+    algorithm=st.sampled_from(names("algorithm")),
+)
 def test_minimal_is_said_only_if_each_element_was_left_out(needed, algorithm):
     tested = []
 
@@ -299,7 +335,9 @@ def graded(rng):
 @pytest.mark.parametrize("algorithm", ["ddenv", "splitting"])
 def test_where_many_elements_take_a_bit_it_ends_within_its_calls_with_what_is_not_lost(algorithm):
     for salt in range(5):
-        found = ddenv.reduce(ELEMENTS, graded(np.random.default_rng(salt)), algorithm=algorithm, iterations=3, **ALL)
+        found = ddenv.reduce(
+            ELEMENTS, graded(np.random.default_rng(salt)), algorithm=algorithm, iterations=3, **ALL
+        )
         assert found.tests < 1500
         assert found.claims[0].verdict != "lost"
         assert found.claims[0].bound
@@ -310,15 +348,21 @@ def test_where_many_elements_take_a_bit_it_ends_within_its_calls_with_what_is_no
 def test_what_a_rare_failure_costs_is_said_before():
     """And what the calls show by then is returned."""
     rng = np.random.default_rng(3)
-    with pytest.warns(UserWarning, match="to certify what is left takes about .* of them, and most_tests allows 300"):
-        found = ddenv.reduce(ELEMENTS, lambda kept: "a" in kept and rng.random() < 0.3, most_tests=300, **ALL)
+    with pytest.warns(
+        UserWarning,
+        match="to certify what is left takes about .* of them, and most_tests allows 300",
+    ):
+        found = ddenv.reduce(
+            ELEMENTS, lambda kept: "a" in kept and rng.random() < 0.3, most_tests=300, **ALL
+        )
     assert found.flaky
     assert found.certificate_tests <= 400
 
 
 def test_where_a_certificate_follows_a_search_needs_fewer_tests():
     kept, first = (
-        ddenv.reduce(ELEMENTS, needs("b", "g"), iterations=1, accept_rate=rule, **ALL) for rule in ("kept", "first")
+        ddenv.reduce(ELEMENTS, needs("b", "g"), iterations=1, accept_rate=rule, **ALL)
+        for rule in ("kept", "first")
     )
     assert kept.kept == first.kept
     assert kept.search_tests < first.search_tests
@@ -326,7 +370,12 @@ def test_where_a_certificate_follows_a_search_needs_fewer_tests():
 
 def test_without_a_check_the_first_test_is_already_a_smaller_one():
     made = []
-    ddenv.reduce(ELEMENTS, lambda kept: bool(made.append(kept)) or kept >= {"a"}, check=False, algorithm="ddmin")
+    ddenv.reduce(
+        ELEMENTS,
+        lambda kept: bool(made.append(kept)) or kept >= {"a"},
+        check=False,
+        algorithm="ddmin",
+    )
     assert made[0] != frozenset(ELEMENTS)
 
 
@@ -338,32 +387,80 @@ def test_rounds_are_reported_before_they_are_tested():
 
 
 WRONG = {
-    "no positions": ({}, "partitioning 'model2model' needs positions, which is missing; or use one of timeseg"),
+    "no positions": (
+        {},
+        "partitioning 'model2model' needs positions, which is missing; or use one of timeseg",
+    ),
     "no trajectory": (
         {"positions": POSITIONS, "partitioning": "timeseg", "failure_pose": (0, 0, 0)},
         "partitioning 'timeseg' needs a trajectory",
     ),
-    "no failure": ({"positions": POSITIONS}, "prioritization 'failure-proximal' needs a failure_pose"),
+    "no failure": (
+        {"positions": POSITIONS},
+        "prioritization 'failure-proximal' needs a failure_pose",
+    ),
     "no times": (
         {"positions": POSITIONS, "prioritization": "timestep"},
         "prioritization 'timestep' needs first_sensed",
     ),
     "unknown algorithm": ({"algorithm": "ddmim"}, "no algorithm 'ddmim' (did you mean ddmin?)"),
-    "unknown schema": ({"partitioning": "timesegs"}, "no partitioning 'timesegs' (did you mean timeseg?)"),
-    "a place is missing": ({"positions": {"a": (0, 0, 0)}}, "positions['b']: expected x, y, z m, found None"),
-    "a place is none": ({"positions": POSITIONS | {"a": (0, float("nan"), 0)}}, "positions['a']: expected x, y, z m"),
-    "a place is text": ({"positions": POSITIONS | {"a": "near"}}, "positions['a']: expected x, y, z m"),
-    "a trajectory of another shape": ({"trajectory": np.zeros((3, 4))}, "shape (N, 5), found shape (3, 4)"),
-    "a trajectory of words": ({"trajectory": [["now", "here"]]}, "trajectory: expected finite numbers"),
-    "a trajectory backwards": ({"trajectory": TRAJECTORY[::-1]}, "its times, in the first column, must not decrease"),
-    "a time of sensing": ({"first_sensed": {"a": "soon"}}, "first_sensed['a']: expected a time in s"),
-    "iterations": ({"iterations": -1}, "iterations: expected a whole number from 0 to 1000, found -1"),
-    "n_partitions": ({"n_partitions": 1}, "n_partitions: expected a whole number from 2 to 100000, found 1"),
-    "candidates": ({"candidates": "all"}, "candidates: 'all' is not allowed; use one of both, partitions, complements"),
-    "accept_rate": ({"accept_rate": "often"}, "accept_rate: 'often' is not allowed; use one of first, kept"),
-    "keep_rate": ({"keep_rate": 1.0}, "keep_rate: expected a number, more than 0, at most 0.95, found 1.0"),
+    "unknown schema": (
+        {"partitioning": "timesegs"},
+        "no partitioning 'timesegs' (did you mean timeseg?)",
+    ),
+    "a place is missing": (
+        {"positions": {"a": (0, 0, 0)}},
+        "positions['b']: expected x, y, z m, found None",
+    ),
+    "a place is none": (
+        {"positions": POSITIONS | {"a": (0, float("nan"), 0)}},
+        "positions['a']: expected x, y, z m",
+    ),
+    "a place is text": (
+        {"positions": POSITIONS | {"a": "near"}},
+        "positions['a']: expected x, y, z m",
+    ),
+    "a trajectory of another shape": (
+        {"trajectory": np.zeros((3, 4))},
+        "shape (N, 5), found shape (3, 4)",
+    ),
+    "a trajectory of words": (
+        {"trajectory": [["now", "here"]]},
+        "trajectory: expected finite numbers",
+    ),
+    "a trajectory backwards": (
+        {"trajectory": TRAJECTORY[::-1]},
+        "its times, in the first column, must not decrease",
+    ),
+    "a time of sensing": (
+        {"first_sensed": {"a": "soon"}},
+        "first_sensed['a']: expected a time in s",
+    ),
+    "iterations": (
+        {"iterations": -1},
+        "iterations: expected a whole number from 0 to 1000, found -1",
+    ),
+    "n_partitions": (
+        {"n_partitions": 1},
+        "n_partitions: expected a whole number from 2 to 100000, found 1",
+    ),
+    "candidates": (
+        {"candidates": "all"},
+        "candidates: 'all' is not allowed; use one of both, partitions, complements",
+    ),
+    "accept_rate": (
+        {"accept_rate": "often"},
+        "accept_rate: 'often' is not allowed; use one of first, kept",
+    ),
+    "keep_rate": (
+        {"keep_rate": 1.0},
+        "keep_rate: expected a number, more than 0, at most 0.95, found 1.0",
+    ),
     "most_tests": ({"most_tests": 0}, "most_tests: expected a whole number, at least 1, found 0"),
-    "baseline_runs": ({"baseline_runs": 0}, "baseline_runs: expected a whole number from 1 to 1000, found 0"),
+    "baseline_runs": (
+        {"baseline_runs": 0},
+        "baseline_runs: expected a whole number from 1 to 1000, found 0",
+    ),
     "prior": ({"prior": "near"}, "prior: 'near' is not allowed"),
     "delta": ({"delta": 0}, "delta: expected a number, more than 0"),
     "no seed": ({"seed": None}, "seed: expected a whole number from 0 to 2147483647, found None"),
@@ -375,12 +472,27 @@ WRONG = {
         {"positions": POSITIONS | {"a": (1e200, 0, 0)}},
         "positions['a']: expected x, y, z m",
     ),
-    "a time before the beginning": ({"first_sensed": {"a": -1e6}}, "first_sensed['a']: expected a time in s"),
-    "a time beyond all numbers": ({"first_sensed": {"a": 10**400}}, "first_sensed['a']: expected a time in s"),
-    "a complex trajectory": ({"trajectory": TRAJECTORY + 1j}, "trajectory: expected finite numbers"),
-    "no algorithm": ({"algorithm": None, **ALL}, "algorithm: expected a name, found None; use one of ddenv"),
+    "a time before the beginning": (
+        {"first_sensed": {"a": -1e6}},
+        "first_sensed['a']: expected a time in s",
+    ),
+    "a time beyond all numbers": (
+        {"first_sensed": {"a": 10**400}},
+        "first_sensed['a']: expected a time in s",
+    ),
+    "a complex trajectory": (
+        {"trajectory": TRAJECTORY + 1j},
+        "trajectory: expected finite numbers",
+    ),
+    "no algorithm": (
+        {"algorithm": None, **ALL},
+        "algorithm: expected a name, found None; use one of ddenv",
+    ),
     "a number as schema": ({"partitioning": 3}, "partitioning: expected a name, found 3"),
-    "traits of another kind": ({"traits": dict.fromkeys(ELEMENTS, 1)}, "traits['a']: expected ddenv.Traits, found 1"),
+    "traits of another kind": (
+        {"traits": dict.fromkeys(ELEMENTS, 1)},
+        "traits['a']: expected ddenv.Traits, found 1",
+    ),
 }
 
 
@@ -396,7 +508,8 @@ def test_wrong_input_is_reported_in_one_line_before_any_test(case):
 
 
 @pytest.mark.parametrize(
-    ("elements", "words"), [*((one, "expected names") for one in (None, 3, [["a"]])), ("abca", "'a' occurs twice")]
+    ("elements", "words"),
+    [*((one, "expected names") for one in (None, 3, [["a"]])), ("abca", "'a' occurs twice")],
 )
 def test_elements_that_are_no_names_or_have_one_twice_are_refused(elements, words):
     with pytest.raises(ddenv.UserError, match=f"elements: {words}"):
@@ -406,7 +519,9 @@ def test_elements_that_are_no_names_or_have_one_twice_are_refused(elements, word
 def test_numbers_of_numpy_are_numbers():
     numbers = {"iterations": np.int64(1), "seed": np.int32(2), "delta": np.float32(0.3)}
     facts = ALL | {"first_sensed": {"a": np.float32(1), "b": np.int64(2)}}
-    assert ddenv.reduce(ELEMENTS, needs("b"), prioritization="timestep", **numbers, **facts).kept == ("b",)
+    assert ddenv.reduce(
+        ELEMENTS, needs("b"), prioritization="timestep", **numbers, **facts
+    ).kept == ("b",)
 
 
 @pytest.mark.parametrize("error", [RuntimeError, StopIteration])
@@ -434,7 +549,9 @@ def test_the_guides_examples_run():
     for block in blocks:
         done = python(block)
         assert done.returncode == 0, done.stderr
-        shown = [line.split("# prints ", 1)[1] for line in block.splitlines() if "# prints " in line]
+        shown = [
+            line.split("# prints ", 1)[1] for line in block.splitlines() if "# prints " in line
+        ]
         assert done.stdout.splitlines() == shown
 
 
@@ -445,10 +562,15 @@ def test_the_guides_algorithm_works_as_printed():
     found = {}
     exec(next(block for block in blocks if block.startswith("# file farthest_half.py")), found)
     known = line(a=0, b=1, c=2, d=3, e=4, f=5, g=6, h=7)
-    searching = found["farthest_half"](tuple(range(8)), make_guide("model2model", "failure-proximal", lambda: known))
+    searching = found["farthest_half"](
+        tuple(range(8)), make_guide("model2model", "failure-proximal", lambda: known)
+    )
     assert [one.models for one in next(searching).candidates] == [Environment.of(range(4))]
     assert [
-        one.models for one in searching.send(Candidate(kind="", partition=0, part=(), models=Environment.of(range(4)), lacks=NOTHING)).candidates
+        one.models
+        for one in searching.send(
+            Candidate(kind="", partition=0, part=(), models=Environment.of(range(4)), lacks=NOTHING)
+        ).candidates
     ] == [Environment.of(range(2))]
     with pytest.raises(StopIteration) as end:
         searching.send(None)
@@ -460,16 +582,21 @@ def test_the_guides_package_works_as_printed(tmp_path):
     """Put where pip would put it, its schema is used by name."""
     page = (ROOT / "docs" / "library.md").read_text()
     module = next(
-        part.split("```")[0] for part in page.split("```python\n") if part.startswith("# file heavy_first.py")
+        part.split("```")[0]
+        for part in page.split("```python\n")
+        if part.startswith("# file heavy_first.py")
     )
     project = tomllib.loads(page.split("```toml\n")[1].split("```")[0])["project"]
     (tmp_path / "heavy_first.py").write_text(module)
     info = tmp_path / f"{project['name']}-{project['version']}.dist-info"
     info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
+    (info / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
+    )
     groups = project["entry-points"].items()
     points = "\n".join(
-        f"[{group}]\n" + "\n".join(f"{k} = {v}" for k, v in entries.items()) for group, entries in groups
+        f"[{group}]\n" + "\n".join(f"{k} = {v}" for k, v in entries.items())
+        for group, entries in groups
     )
     (info / "entry_points.txt").write_text(points)
     code = (

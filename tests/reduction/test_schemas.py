@@ -27,18 +27,34 @@ STILL = np.array([[0.0, 0, 0, 0, 0]])
 
 
 def known(positions, trajectory):
-    return Evidence(elements=tuple(positions), positions=positions, trajectory=np.array(trajectory, dtype=float), failure_position=tuple(trajectory[-1][1:4]))
+    return Evidence(
+        elements=tuple(positions),
+        positions=positions,
+        trajectory=np.array(trajectory, dtype=float),
+        failure_position=tuple(trajectory[-1][1:4]),
+    )
 
 
 def test_model2model_finds_clusters_in_space():
-    positions = {"a": (0.0, 0, 0), "b": (9.0, 0, 0), "c": (0.1, 0, 0), "d": (9.0, 0.1, 0), "e": (0.0, 5, 0)}
+    positions = {
+        "a": (0.0, 0, 0),
+        "b": (9.0, 0, 0),
+        "c": (0.1, 0, 0),
+        "d": (9.0, 0.1, 0),
+        "e": (0.0, 5, 0),
+    }
     found = model2model(tuple("abcde"), 3, known(positions, STILL))
     assert sorted(found) == [("a", "c"), ("b", "d"), ("e",)]
 
 
 def test_models_at_one_place_fall_back_to_one_model_partitions():
     positions = dict.fromkeys("abcd", (1.0, 1.0, 0.0))
-    assert model2model(tuple("abcd"), 3, known(positions, STILL)) == [("a",), ("b",), ("c",), ("d",)]
+    assert model2model(tuple("abcd"), 3, known(positions, STILL)) == [
+        ("a",),
+        ("b",),
+        ("c",),
+        ("d",),
+    ]
 
 
 def test_timeseg_groups_models_by_when_the_robot_was_near():
@@ -53,7 +69,9 @@ def test_timeseg_measures_to_the_path_and_not_only_to_its_samples():
     distance, fraction = to_segments(np.array([[5.0, 4.0, 0.0]]), path)
     assert distance[0] == pytest.approx([4.0, 5.0])
     assert fraction[0, 0] == pytest.approx(0.5)
-    assert nearest_on_path(np.array([[5.0, 4.0, 0.0]]), np.arange(3.0), path)[1] == pytest.approx([0.5])
+    assert nearest_on_path(np.array([[5.0, 4.0, 0.0]]), np.arange(3.0), path)[1] == pytest.approx(
+        [0.5]
+    )
 
 
 def test_of_two_times_at_one_place_the_first_counts():
@@ -71,7 +89,9 @@ def turning(*rates):
     """A robot with one turn rate (rad/s) for each second, sampled every 0.1 s."""
     yaw = np.concatenate([[0.0], np.cumsum(np.repeat(rates, 10)) / 10])
     times = np.arange(len(yaw)) / 10
-    return np.column_stack([times, np.cos(yaw), np.sin(yaw), np.zeros(len(yaw)), np.angle(np.exp(1j * yaw))])
+    return np.column_stack(
+        [times, np.cos(yaw), np.sin(yaw), np.zeros(len(yaw)), np.angle(np.exp(1j * yaw))]
+    )
 
 
 def test_trajectoryseg_cuts_where_the_turning_changes():
@@ -95,7 +115,11 @@ def test_of_too_many_cuts_the_sharpest_stay():
 def test_trajectoryseg_groups_models_by_manoeuvre():
     straight = [[t / 10, t / 10, 0, 0, 0] for t in range(21)]
     turn = [[2 + t / 10, 2 + np.sin(t / 10), 1 - np.cos(t / 10), 0, t / 10] for t in range(1, 11)]
-    positions = {"on the way": (1.0, 0.5, 0), "in the turn": (3.0, 0.2, 0), "at the start": (-1.0, 0, 0)}
+    positions = {
+        "on the way": (1.0, 0.5, 0),
+        "in the turn": (3.0, 0.2, 0),
+        "at the start": (-1.0, 0, 0),
+    }
     found = trajectoryseg(tuple(positions), 2, known(positions, straight + turn))
     assert found == [("on the way", "at the start"), ("in the turn",)]
 
@@ -115,7 +139,12 @@ def test_five_thousand_models_are_split_in_the_end(partitioning, n):
 
 
 PATH = np.array([[0.0, 0, 0, 0, 0], [1.0, 4, 0, 0, 0]])
-KNOWN = Evidence(elements=("a", "b", "c"), positions={"a": (0.0, 3, 0), "b": (4.0, 3, 0), "c": (2.0, 0, 1)}, trajectory=PATH, failure_position=(4.0, 0.0, 0.0))
+KNOWN = Evidence(
+    elements=("a", "b", "c"),
+    positions={"a": (0.0, 3, 0), "b": (4.0, 3, 0), "c": (2.0, 0, 1)},
+    trajectory=PATH,
+    failure_position=(4.0, 0.0, 0.0),
+)
 PARTS = [("a",), ("b",), ("a", "b"), ("c",)]
 
 

@@ -60,11 +60,15 @@ def test_what_holds_any_of_a_stack_is_completed_to_whole_stacks(count, pairs, ch
 @every_search
 @given(count=COUNTS, pairs=PAIRS, seed=st.integers(0, 1000))
 @examples(0.2)
-def test_no_candidate_breaks_a_stack_and_no_stack_can_be_left_out(algorithm, pair, count, pairs, seed):
+def test_no_candidate_breaks_a_stack_and_no_stack_can_be_left_out(
+    algorithm, pair, count, pairs, seed
+):
     known = evidence(count, seed)
     found = stacks_of(count, pairs)
     is_similar, trials, winner = any_oracle(seed), [], None
-    guide = make_guide(*pair, lambda: replace(known, trials=trials), growth="steady", skip="implied")
+    guide = make_guide(
+        *pair, lambda: replace(known, trials=trials), growth="steady", skip="implied"
+    )
     searching = found.expand(search(algorithm, found.representatives, guide))
     environment = Environment.whole(count)
     while True:

@@ -25,7 +25,9 @@ def outcomes(rate_of, seed=0):
 
 
 def place(shown, rate=0.9, lost_rate=0.3):
-    return last_good(CHAIN, lambda subject: settle(good_enough(subject, rate, 0.8, lost_rate), shown))
+    return last_good(
+        CHAIN, lambda subject: settle(good_enough(subject, rate, 0.8, lost_rate), shown)
+    )
 
 
 @given(last=st.integers(0, 10), salt=st.integers(0, 10**6))
@@ -55,13 +57,18 @@ def test_where_runs_break_nothing_shows_that_the_rate_is_kept():
     assert place(lambda *_: "broken") == 0
 
 
-@given(needed=st.sets(st.sampled_from(range(12)), min_size=1).map(Environment.of), step=st.integers(0, 10))
+@given(
+    needed=st.sets(st.sampled_from(range(12)), min_size=1).map(Environment.of),
+    step=st.integers(0, 10),
+)
 def test_models_that_went_too_early_are_found_and_all_others_go_again(needed, step):
     """The end lacked a needed model since step + 1."""
     good, bad, end = CHAIN[step], CHAIN[step + 1], CHAIN[-1]
     needed = (needed & good) | (good - bad)
     again = tried_again(tuple(good), groups_again(good, bad, end), sweep)
-    assert carried_through(again, lambda models: not models <= bad and needed <= models)[0] == needed
+    assert (
+        carried_through(again, lambda models: not models <= bad and needed <= models)[0] == needed
+    )
 
 
 @pytest.mark.parametrize(

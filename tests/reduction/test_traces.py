@@ -52,7 +52,9 @@ def test_ddenv_in_a_world_of_six_models_line_by_line():
 
 
 def test_far_first_leaves_the_farthest_out_first():
-    _, rounds = run(line(a=0, b=1, c=2), lambda _: False, n_partitions=3, complement_order="far-first")
+    _, rounds = run(
+        line(a=0, b=1, c=2), lambda _: False, n_partitions=3, complement_order="far-first"
+    )
     complements = [one for one in rounds[0][0].candidates if one.kind == "complement"]
     assert words(complements) == ["ab", "ac", "bc"]
 
@@ -79,7 +81,11 @@ def test_ddmin_does_what_its_paper_prints():
     for round, winner in rounds:
         for one in tried(round, winner):
             mark = "*" if one.models in seen else ""
-            trace.append("".join(str(1 + model) for model in one.models) + mark + ("!" if one is winner else ""))
+            trace.append(
+                "".join(str(1 + model) for model in one.models)
+                + mark
+                + ("!" if one is winner else "")
+            )
             seen.add(one.models)
     # Two halves, then four quarters and their complements, of which 1-2, 5-8 still fails.
     assert trace[:8] == ["1234", "5678", "12", "34", "56", "78", "345678", "125678!"]
@@ -111,7 +117,9 @@ def test_probdd_leaves_out_what_promises_most():
     known = evidence(20, 3)
     rounds = run(known, needing(known, "m0"), algorithm="probdd", prior="uniform")[1]
     assert len(rounds[0][0].partitions[0]) in (9, 10)
-    failed = [round.partitions[0] for round, won in rounds if won is None and len(round.partitions[0]) > 1]
+    failed = [
+        round.partitions[0] for round, won in rounds if won is None and len(round.partitions[0]) > 1
+    ]
     assert all(0 in group for group in failed)
 
 
@@ -130,7 +138,10 @@ def test_what_was_missed_by_chance_implies_nothing_once_it_is_gone():
     """Without e and f the failure is missed once, but shows when more is gone: then the two say nothing any more."""
     known = line(a=0, b=1, c=2, d=3, e=8, f=9, g=20, h=21)
     kept, rounds = run(
-        known, lambda models: 0 in models and letters(models) != "abcdgh", growth="steady", skip="implied"
+        known,
+        lambda models: 0 in models and letters(models) != "abcdgh",
+        growth="steady",
+        skip="implied",
     )
     assert letters(kept) == "a"
     # It goes on in steps of several models, and not one by one.

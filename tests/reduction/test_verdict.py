@@ -13,7 +13,12 @@ from tests.tiers import slow
 firsts = st.builds(Acceptance, st.integers(1, 4))
 broke = st.sets(st.integers(0, 9), max_size=4).map(lambda runs: tuple(sorted(runs)))
 keeping = st.builds(
-    Acceptance, st.integers(1, 12), st.floats(0.05, 1), st.floats(0.3, 0.95), st.integers(0, 3), broke=broke
+    Acceptance,
+    st.integers(1, 12),
+    st.floats(0.05, 1),
+    st.floats(0.3, 0.95),
+    st.integers(0, 3),
+    broke=broke,
 )
 rules = firsts | keeping
 rates = st.lists(st.sampled_from([0.0, 0.3, 0.8, 1.0]), min_size=1, max_size=5)
@@ -64,7 +69,9 @@ def winner_of(verdicts):
     workers=st.integers(1, 4),
     enough=st.sampled_from([None, 16]),
 )
-def test_any_number_of_workers_in_any_order_finds_what_one_worker_finds(rates, salt, rule, breaks, workers, enough):
+def test_any_number_of_workers_in_any_order_finds_what_one_worker_finds(
+    rates, salt, rule, breaks, workers, enough
+):
     order, shown, candidates = random.Random(salt), outcomes(rates, salt, breaks), range(len(rates))
     winner, verdicts, made = in_order(shown, candidates, rule)
     known, running = {}, []
@@ -96,7 +103,10 @@ def test_the_runs_that_decided_are_those_that_one_worker_makes(rates, salt, rule
 def test_refused_candidates_need_no_test_and_cannot_win(rates, salt, rule, refused):
     shown, candidates = outcomes(rates, salt), range(len(rates))
     verdicts, _ = standing(candidates, shown, rule, refused.__contains__)
-    assert winner_of(verdicts) == in_order(shown, [one for one in candidates if one not in refused], rule)[0]
+    assert (
+        winner_of(verdicts)
+        == in_order(shown, [one for one in candidates if one not in refused], rule)[0]
+    )
     assert standing(candidates, lambda *_: None, rule, lambda _: True)[1] == []
 
 
@@ -123,19 +133,25 @@ def test_no_more_is_looked_at_than_workers_can_do():
 @given(broke=broke, places=st.integers(1, 20))
 def test_runs_that_broke_in_the_whole_world_are_left_out_of_the_search_and_no_others(broke, places):
     rule = Acceptance(most_misses=4, rate=0.5, broke=broke)
-    assert [rule.run(place) for place in range(places)] == [run for run in range(40) if run not in broke][:places]
+    assert [rule.run(place) for place in range(places)] == [
+        run for run in range(40) if run not in broke
+    ][:places]
 
 
 def test_a_broken_run_is_passed_over_where_few_broke_and_in_no_exact_reduction():
     sound = [True, True, True]
 
     def verdict(results, **rule):
-        return standing([0], lambda _, run: results[run], Acceptance(most_misses=4, rate=0.5, **rule))[0][0]
+        return standing(
+            [0], lambda _, run: results[run], Acceptance(most_misses=4, rate=0.5, **rule)
+        )[0][0]
 
     assert verdict([*sound, "broken", *sound]) == verdict([*sound, *sound]) == "similar"
     assert verdict(["broken", *sound, *sound]) == "unknown"
     # A simulator that no longer works costs one run of each candidate.
-    assert standing([0, 1], lambda _, run: None if run else "broken", Acceptance(most_misses=4)) == (["unknown", "unknown"], [])
+    assert standing(
+        [0, 1], lambda _, run: None if run else "broken", Acceptance(most_misses=4)
+    ) == (["unknown", "unknown"], [])
     assert verdict([False, False, False, "broken"], exact=(0, 1, 2, 3)) == "unknown"
 
 
@@ -158,7 +174,9 @@ def test_a_hit_never_speaks_against_a_candidate(rule, shown, missed):
 
 
 @given(rule=keeping, seed=st.integers(0, 10**6), rate=st.floats(0, 1))
-def test_every_candidate_is_decided_and_one_without_a_hit_costs_no_more_than_by_the_papers_rule(rule, seed, rate):
+def test_every_candidate_is_decided_and_one_without_a_hit_costs_no_more_than_by_the_papers_rule(
+    rule, seed, rate
+):
     draw, shown, missed = random.Random(seed), 0, 0
     while not rule.verdict(shown, missed):
         hit = draw.random() < rate
@@ -176,7 +194,11 @@ def test_where_f_always_shows_one_hit_or_two_misses_are_enough():
 
 def test_after_a_step_back_more_hits_are_asked_for():
     hits = [
-        next(hits for hits in range(1, 50) if Acceptance(most_misses=4, rate=0.9, steps_back=back).verdict(hits, 0) == "similar")
+        next(
+            hits
+            for hits in range(1, 50)
+            if Acceptance(most_misses=4, rate=0.9, steps_back=back).verdict(hits, 0) == "similar"
+        )
         for back in range(4)
     ]
     assert hits == sorted(hits)

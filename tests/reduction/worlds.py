@@ -25,15 +25,31 @@ def evidence(count, seed, **known):
     trajectory = np.column_stack([np.arange(20) / 10, path, np.cumsum(rng.normal(size=20))])
     sensed = {name: float(rng.uniform(0, 2)) for name in elements if rng.random() < 0.7}
     traits = {name: Traits(*rng.uniform(0.1, 2, 2), bool(rng.random() < 0.5)) for name in elements}
-    facts = {"first_sensed": sensed, "touched": frozenset(list(sensed)[::3]), "traits": traits, "seed": seed} | known
-    return Evidence(elements=elements, positions=positions, trajectory=trajectory, failure_position=tuple(path[-1]), **facts)
+    facts = {
+        "first_sensed": sensed,
+        "touched": frozenset(list(sensed)[::3]),
+        "traits": traits,
+        "seed": seed,
+    } | known
+    return Evidence(
+        elements=elements,
+        positions=positions,
+        trajectory=trajectory,
+        failure_position=tuple(path[-1]),
+        **facts,
+    )
 
 
 def line(**places):
     """Models on a line, the robot came from x = 5 and failed at 0."""
     positions = {name: (float(x), 0.0, 0.0) for name, x in places.items()}
     trajectory = np.array([[0.0, 5, 0, 0, 0], [1.0, 0, 0, 0, 0]])
-    return Evidence(elements=tuple(places), positions=positions, trajectory=trajectory, failure_position=(0.0, 0.0, 0.0))
+    return Evidence(
+        elements=tuple(places),
+        positions=positions,
+        trajectory=trajectory,
+        failure_position=(0.0, 0.0, 0.0),
+    )
 
 
 def run(known, is_similar, pair=("model2model", "failure-proximal"), algorithm="ddenv", **options):
@@ -43,7 +59,9 @@ def run(known, is_similar, pair=("model2model", "failure-proximal"), algorithm="
     searching = search(algorithm, range(len(known.elements)), guide)
 
     def learn(round, winner):
-        trials.extend(Trial(one.models, one is winner, known.elements) for one in tried(round, winner))
+        trials.extend(
+            Trial(one.models, one is winner, known.elements) for one in tried(round, winner)
+        )
 
     return carried_through(searching, is_similar, learn)
 
@@ -64,7 +82,11 @@ def carried_through(searching, is_similar, learn=lambda round, winner: None):
 
 def tried(round, winner):
     """The candidates of a round up to the winner."""
-    return round.candidates if winner is None else round.candidates[: round.candidates.index(winner) + 1]
+    return (
+        round.candidates
+        if winner is None
+        else round.candidates[: round.candidates.index(winner) + 1]
+    )
 
 
 def needing(known, *names):

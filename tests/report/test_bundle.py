@@ -15,7 +15,15 @@ from ddenv.report.run_data import read_run
 from tests.conftest import ROOT
 from tests.workbench import fake_moments, fake_run
 
-FILES = ["ISSUE.md", "report.html", "repro.py", "run.ddenv", "scenario.robot.sdf", "scenario.yaml", "world.sdf"]
+FILES = [
+    "ISSUE.md",
+    "report.html",
+    "repro.py",
+    "run.ddenv",
+    "scenario.robot.sdf",
+    "scenario.yaml",
+    "world.sdf",
+]
 EXAMPLE = ROOT / "docs/examples/any_simulator"
 
 
@@ -38,7 +46,9 @@ def test_folder_and_zip_have_the_same_files(run, tmp_path):
     assert not list(tmp_path.glob(".ddenv-bundle-*"))
 
 
-def test_the_run_that_goes_along_says_the_same_and_has_only_the_trajectories_that_are_drawn(run, tmp_path):
+def test_the_run_that_goes_along_says_the_same_and_has_only_the_trajectories_that_are_drawn(
+    run, tmp_path
+):
     write_bundle(run, tmp_path / "handed")
     whole, copy = read_run(run), read_run(tmp_path / "handed" / "run.ddenv")
     assert (copy.state, copy.reasons, copy.ways, copy.original) == (
@@ -58,9 +68,15 @@ def test_the_issue_says_what_fails_how_often_and_what_is_needed(run, tmp_path):
     write_bundle(run, tmp_path / "handed")
     issue = (tmp_path / "handed" / "ISSUE.md").read_text()
     assert issue.startswith("# 2 of 11 models are enough to make the robot fail\n")
-    assert "f in 23 of 23 fresh runs (80 % to 100 %): keeps at least 81 % of the whole world's rate" in issue
+    assert (
+        "f in 23 of 23 fresh runs (80 % to 100 %): keeps at least 81 % of the whole world's rate"
+        in issue
+    )
     assert "- `crate_00`\n- `crate_01`\n" in issue
-    assert all(f"`{shown}`" in issue for shown in ("report.html", "ddenv open run.ddenv", "ddenv test scenario.yaml"))
+    assert all(
+        f"`{shown}`" in issue
+        for shown in ("report.html", "ddenv open run.ddenv", "ddenv test scenario.yaml")
+    )
     assert "Without crate_00 the robot reaches its goal" in issue
     assert "A nearest world that passes lacks 1 model of 11 (crate_00)" in issue
 
@@ -99,7 +115,9 @@ def test_git_bisect_finds_the_change_that_made_the_robot_fail(tmp_path, home):
 
     def git(*words):
         name = ("-c", "user.name=a", "-c", "user.email=a@b.c", "-c", "commit.gpgsign=false")
-        done = subprocess.run(["git", *name, *words], cwd=repository, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            ["git", *name, *words], cwd=repository, capture_output=True, text=True, check=False
+        )
         assert done.returncode == 0, done.stderr
         return done.stdout
 
@@ -112,7 +130,9 @@ def test_git_bisect_finds_the_change_that_made_the_robot_fail(tmp_path, home):
         git("commit", "-q", "-m", f"change {number}")
     ddenv = [sys.executable, "-m", "ddenv"]
     start = ["run", "scenario.yaml", "--trust", "--output", "found.ddenv", "--jobs", "2"]
-    done = subprocess.run([*ddenv, *start], cwd=repository, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [*ddenv, *start], cwd=repository, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     write_bundle(repository / "found.ddenv", bundle)
     git("bisect", "start", "HEAD", "HEAD~4")

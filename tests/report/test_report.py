@@ -70,7 +70,9 @@ def page(run, tmp_path):
 
 def table(report, title):
     """The rows of the table that has a column of this title."""
-    tables = (block for section in report.sections for block in section.blocks if isinstance(block, Table))
+    tables = (
+        block for section in report.sections for block in section.blocks if isinstance(block, Table)
+    )
     return next(each.rows for each in tables if title in each.head)
 
 
@@ -94,7 +96,9 @@ def test_a_certificate_that_was_stopped_says_what_it_has_shown(run):
 
 def test_it_begins_with_a_paragraph_for_everyone(run):
     fake_moments.mid_round(run)
-    assert "Fresh runs have not checked that yet." in "".join(map(words, content(read_run(run.path)).lead[0].parts))
+    assert "Fresh runs have not checked that yet." in "".join(
+        map(words, content(read_run(run.path)).lead[0].parts)
+    )
 
 
 def test_a_finished_run_in_a_few_words(run, tmp_path):
@@ -108,15 +112,24 @@ def test_a_finished_run_in_a_few_words(run, tmp_path):
         "runs and 0 s of computing time."
     )
     titles = [section.title for section in report.sections]
-    first = ["The minimal environment", "What the result is worth", "Why it fails", "How it got there"]
+    first = [
+        "The minimal environment",
+        "What the result is worth",
+        "Why it fails",
+        "How it got there",
+    ]
     assert [title for title in titles if title in first] == first
     rows = rows_of(run, "model")
     assert rows[0] == ("crate_00", "static", "-4.50, 0.00, 0.15", "1.20 × 0.80 × 0.30")
     assert [row[0] for row in rows] == ["crate_00", "crate_01"]
     text = page(run, tmp_path).text
     assert "2 of 11 models are enough to make the robot fail" in text
-    assert "Minimal: no single model can be removed: f in 23 of 23 fresh runs (80 % to 100 %)" in text
-    assert "without crate_01 12 11 pass, 1 similar" in text.replace("1 similar, 11 pass", "11 pass, 1 similar")
+    assert (
+        "Minimal: no single model can be removed: f in 23 of 23 fresh runs (80 % to 100 %)" in text
+    )
+    assert "without crate_01 12 11 pass, 1 similar" in text.replace(
+        "1 similar, 11 pass", "11 pass, 1 similar"
+    )
     assert "the robot got stuck at (2.00, 0.40, 0.20) m." in text
     assert "got stuck in 3 of 4 runs: 75 %, 95 % interval 30 % to 95 %" in text
     assert f"ddenv test {run.path} --minimal --leave-each-out" in text
@@ -181,10 +194,18 @@ def test_settings_that_were_changed_on_the_way(run):
 STATES = {
     "Not started yet": lambda run: run,
     "The engine is not running": lambda run: run.created(),
-    "Stopped: as you asked.": lambda run: run.created().baseline().write("engine_stopped", reason="as you asked"),
-    "The engine could not go on: no disk.": lambda run: run.created().write("engine_failed", reason="no disk"),
-    "No failure is known yet": lambda run: run.created().write("finished", minimal=False, reason="no run failed"),
-    "This run has not ended. This report shows what was known at": lambda run: fake_moments.mid_round(run).hold(),
+    "Stopped: as you asked.": lambda run: (
+        run.created().baseline().write("engine_stopped", reason="as you asked")
+    ),
+    "The engine could not go on: no disk.": lambda run: run.created().write(
+        "engine_failed", reason="no disk"
+    ),
+    "No failure is known yet": lambda run: run.created().write(
+        "finished", minimal=False, reason="no run failed"
+    ),
+    "This run has not ended. This report shows what was known at": lambda run: (
+        fake_moments.mid_round(run).hold()
+    ),
 }
 
 
@@ -204,9 +225,13 @@ def test_of_a_damaged_run_what_makes_sense_is_told(run, tmp_path):
 
 
 def test_without_a_world_there_is_no_map(run, tmp_path):
-    fake_moments.finished(run).file._db.execute("UPDATE document SET content = ? WHERE name = 'world'", (b"<sdf",))
+    fake_moments.finished(run).file._db.execute(
+        "UPDATE document SET content = ? WHERE name = 'world'", (b"<sdf",)
+    )
     report = content(read_run(run.path))
-    assert not any(isinstance(each, Picture) and each.name == "map" for each in report.sections[0].blocks)
+    assert not any(
+        isinstance(each, Picture) and each.name == "map" for each in report.sections[0].blocks
+    )
     text = page(run, tmp_path).text
     assert "No map: the world cannot be read." in text and "Left: crate_00, crate_01." in text
 
@@ -237,11 +262,15 @@ def test_markdown_is_the_same_with_pictures_beside_it(tmp_path):
     run = evil(tmp_path)
     file, *drawn = write_report(run.path, tmp_path / "a report.md")
     text = file.read_text()
-    assert not re.search(r"(?<![\\`])<(script|i|b)\b", re.sub(r"(`+).*?(?<!`)\1(?!`)", "", text, flags=re.S))
+    assert not re.search(
+        r"(?<![\\`])<(script|i|b)\b", re.sub(r"(`+).*?(?<!`)\1(?!`)", "", text, flags=re.S)
+    )
     assert "\\<script\\>alert(1)\\</script\\> # \\*x\\*" in text
     rows = [line for line in text.splitlines() if line.startswith("| ") and "static" in line]
     assert len(rows) == len(EVIL) and all(len(re.findall(r"(?<!\\)\|", row)) == 5 for row in rows)
-    assert {path.name for path in drawn} == set(re.findall(r"\]\((.*?\.svg)\)", text.replace("%20", " ")))
+    assert {path.name for path in drawn} == set(
+        re.findall(r"\]\((.*?\.svg)\)", text.replace("%20", " "))
+    )
     assert {file, *drawn} <= set(files_of(file))
     for path in drawn:
         assert ElementTree.fromstring(path.read_text()).tag.endswith("svg")
@@ -284,7 +313,10 @@ def test_very_many_rounds_are_summed_up(run, tmp_path):
         run.write("round_finished")
     rows = rows_of(run, "round")
     assert len(rows) <= MOST_ROUNDS
-    assert rows[:2] == [("1", "2", "2 of 2", "none", "11", "8"), ("7", "2", "1 of 2", "part A", "6", "1")]
+    assert rows[:2] == [
+        ("1", "2", "2 of 2", "none", "11", "8"),
+        ("7", "2", "1 of 2", "part A", "6", "1"),
+    ]
     assert [row[3] for row in rows] == ["none", "part A", "part A", "part A", "none"]
     assert len((tmp_path / write_report(run.path, tmp_path / "r.html")[0]).read_text()) < 100_000
 
@@ -292,7 +324,11 @@ def test_very_many_rounds_are_summed_up(run, tmp_path):
 def test_pictures_are_drawn_of_worlds_of_any_kind(tmp_path):
     empty = b'<sdf version="1.9"><world name="w"/></sdf>'
     bare = b'<sdf version="1.9"><world name="w"><model name="ghost"><link name="l"/></model></world></sdf>'
-    far = fake_run.box("a", 0, 0) + fake_run.box("b", 9e5, 0) + fake_run.box("hall", 0, 0, size=(9e5, 9e5, 1))
+    far = (
+        fake_run.box("a", 0, 0)
+        + fake_run.box("b", 9e5, 0)
+        + fake_run.box("hall", 0, 0, size=(9e5, 9e5, 1))
+    )
     huge = f'<sdf version="1.9"><world name="w">{far}</world></sdf>'.encode()
     for number, world in enumerate((empty, bare, huge)):
         run = fake_run.FakeRun(tmp_path / f"{number}.ddenv", fake_run.scenario(()), world)

@@ -40,37 +40,83 @@ def box_model(name: str, pose: str, size: str, mass: float | None = None, mu: fl
     )
 
 
-def link_of(name: str, shape: Shape | None, pose: Pose, mass: float | None = 1.0, mu: float = 1.0) -> Link:
+def link_of(
+    name: str, shape: Shape | None, pose: Pose, mass: float | None = 1.0, mu: float = 1.0
+) -> Link:
     """A link of one shape; its inertia is about that of a box of 0.4 m."""
     moments = (0.03 * mass,) * 3 if mass else (0.0, 0.0, 0.0)
     collisions = (Collision(name="c", shape=shape, pose=pose, mu=mu),) if shape else ()
-    return Link(name=name, pose=pose, inertia=Inertia(mass, pose, moments) if mass else None, collisions=collisions, visuals=())
+    return Link(
+        name=name,
+        pose=pose,
+        inertia=Inertia(mass, pose, moments) if mass else None,
+        collisions=collisions,
+        visuals=(),
+    )
 
 
 def joint_of(
-    kind: str, parent: str, child: str, at: Vector, axis: Vector = (0.0, 0.0, 1.0), **changes: object
+    kind: str,
+    parent: str,
+    child: str,
+    at: Vector,
+    axis: Vector = (0.0, 0.0, 1.0),
+    **changes: object,
 ) -> Joint:
     """An unlimited joint `at` a place in the world, with changes to its fields."""
-    joint = Joint(name=f"{parent}_{child}", kind=kind, parent=parent, child=child, pose=Pose(at), axis=axis, lower=-np.inf, upper=np.inf, effort=np.inf, velocity=np.inf, damping=0.0)
+    joint = Joint(
+        name=f"{parent}_{child}",
+        kind=kind,
+        parent=parent,
+        child=child,
+        pose=Pose(at),
+        axis=axis,
+        lower=-np.inf,
+        upper=np.inf,
+        effort=np.inf,
+        velocity=np.inf,
+        damping=0.0,
+    )
     return replace(joint, **changes)
 
 
 def model_of(name: str, *links: Link, joints: tuple[Joint, ...] = (), **changes: object) -> Model:
     """A model made of `links`, static if the first has no mass."""
     static = links[0].inertia is None
-    return replace(Model(name=name, pose=links[0].pose, static=static, links=links, joints=joints, spans=(), line=1), **changes)
+    return replace(
+        Model(
+            name=name,
+            pose=links[0].pose,
+            static=static,
+            links=links,
+            joints=joints,
+            spans=(),
+            line=1,
+        ),
+        **changes,
+    )
 
 
 def cube(
-    name: str, x: float, y: float, z: float = 0.15, side: float = 0.3, mass: float | None = 1.0, **changes: object
+    name: str,
+    x: float,
+    y: float,
+    z: float = 0.15,
+    side: float = 0.3,
+    mass: float | None = 1.0,
+    **changes: object,
 ) -> Model:
-    return model_of(name, link_of("link", Box((side, side, side)), Pose((x, y, z)), mass), **changes)
+    return model_of(
+        name, link_of("link", Box((side, side, side)), Pose((x, y, z)), mass), **changes
+    )
 
 
 def door(name: str, x: float, y: float, **changes: object) -> Model:
     """A door leaf of 1 m whose hinge stands on its left."""
     leaf = link_of("leaf", Box((0.05, 1.0, 0.8)), Pose((x, y, 0.6)), mass=3.0)
-    return model_of(name, leaf, joints=(joint_of("revolute", "world", "leaf", (x, y + 0.5, 0.6), **changes),))
+    return model_of(
+        name, leaf, joints=(joint_of("revolute", "world", "leaf", (x, y + 0.5, 0.6), **changes),)
+    )
 
 
 def run(template: Template, *names: str, seed: int = 1) -> RunResult:
@@ -79,7 +125,9 @@ def run(template: Template, *names: str, seed: int = 1) -> RunResult:
 
 def bits(result: RunResult, *left_out: str) -> tuple:
     """All of a run, but for how these models moved and what was noticed."""
-    motions = {name: rows.tobytes() for name, rows in result.motions.items() if name not in left_out}
+    motions = {
+        name: rows.tobytes() for name, rows in result.motions.items() if name not in left_out
+    }
     return result.outcome, result.failure, result.trajectory.tobytes(), motions
 
 

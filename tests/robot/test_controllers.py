@@ -15,7 +15,20 @@ from ddenv.robot.controllers import BadCode, controllers, load
 from ddenv.robot.protocol import Estimate, Reading, Setup, Twist, WheelSpeeds
 from ddenv.world.scenario import Controller
 
-SETUP = Setup(goal=(5, 0), tolerance=0.5, start=(0, 0, 0), joints=("left", "right"), left=(True, False), radius=0.1, track=0.5, footprint=(0, 0, 0, 0), period=0.05, speed=1, acceleration=1, turn_rate=1)
+SETUP = Setup(
+    goal=(5, 0),
+    tolerance=0.5,
+    start=(0, 0, 0),
+    joints=("left", "right"),
+    left=(True, False),
+    radius=0.1,
+    track=0.5,
+    footprint=(0, 0, 0, 0),
+    period=0.05,
+    speed=1,
+    acceleration=1,
+    turn_rate=1,
+)
 READING = Reading(0.0, Estimate(0.0, 0.0, 0.0))
 
 
@@ -29,7 +42,11 @@ def own(folder: Path, body: str, setup: Setup = SETUP, seconds: float = 5.0):
 def stepping(*lines: str) -> str:
     """A class whose `step` has these lines."""
     return "\n".join(
-        ["def __init__(self, setup): pass", "def step(self, reading):", *(f"    {line}" for line in lines)]
+        [
+            "def __init__(self, setup): pass",
+            "def step(self, reading):",
+            *(f"    {line}" for line in lines),
+        ]
     )
 
 
@@ -48,7 +65,9 @@ def test_what_a_controller_may_answer(tmp_path, answer, command):
 
 
 def test_numbers_of_numpy_become_plain_ones(tmp_path):
-    answer = own(tmp_path, stepping("import numpy", "return numpy.float32(1), numpy.int64(0)")).step(READING)
+    answer = own(
+        tmp_path, stepping("import numpy", "return numpy.float32(1), numpy.int64(0)")
+    ).step(READING)
     assert answer == Twist(1.0, 0.0)
     assert {type(answer.speed), type(answer.turn_rate)} == {float}
 
@@ -58,18 +77,27 @@ def test_numbers_of_numpy_become_plain_ones(tmp_path):
     [
         ("return None", r"step returned None; expected Twist\(speed, turn_rate\) or WheelSpeeds"),
         ("return 'left'", "step returned a value of type str"),
-        ("return ('1', 0.0)", "step returned a speed that is a value of type str; expected a number"),
+        (
+            "return ('1', 0.0)",
+            "step returned a speed that is a value of type str; expected a number",
+        ),
         ("return 0.0, float('nan')", "step returned a turn rate of nan"),
         ("return float('inf'), 0.0", "step returned a speed of inf"),
         ("return 1e9, 0.0", r"step returned a speed of 1e\+09; the maximum is 1000"),
-        ("return {'lift': 1.0}", r"step returned a speed for 'lift' \(did you mean left\?\); wheels are left, right"),
+        (
+            "return {'lift': 1.0}",
+            r"step returned a speed for 'lift' \(did you mean left\?\); wheels are left, right",
+        ),
         ("return {'left': None}", "step returned 'left' that is None"),
         ("return 1 / 0", r"step raised ZeroDivisionError: division by zero \(mine.py:5\)$"),
         ("raise SystemExit(3)", r"step raised SystemExit: 3 \(mine.py:5\)"),
         ("raise KeyboardInterrupt", r"step raised KeyboardInterrupt \(mine.py:5\)"),
         ("return self.step(reading)", r"step raised RecursionError: .*\(mine.py:5\)"),
         ("raise MemoryError", "step raised MemoryError"),
-        ("raise ValueError('a\\n\\x1b[31m' + 'b' * 1000)", r"step raised ValueError: a .\[31mb+\.\.\.$"),
+        (
+            "raise ValueError('a\\n\\x1b[31m' + 'b' * 1000)",
+            r"step raised ValueError: a .\[31mb+\.\.\.$",
+        ),
     ],
 )
 def test_a_mistake_is_reported_in_one_line(tmp_path, line, reason):
@@ -79,12 +107,18 @@ def test_a_mistake_is_reported_in_one_line(tmp_path, line, reason):
 
 def test_an_exception_without_text_is_named(tmp_path):
     with pytest.raises(BadCode, match=r"step raised Evil \(mine.py:7\)$"):
-        own(tmp_path, stepping("class Evil(Exception):", "    __str__ = None", "raise Evil")).step(READING)
+        own(tmp_path, stepping("class Evil(Exception):", "    __str__ = None", "raise Evil")).step(
+            READING
+        )
 
 
 def test_what_fails_when_it_is_made_fails_at_the_first_step(tmp_path):
-    controller = own(tmp_path, "def __init__(self, setup): setup.nothing\ndef step(self, reading): pass")
-    with pytest.raises(BadCode, match=r"Mine: __init__ raised AttributeError: .*'nothing' \(mine.py:3\)"):
+    controller = own(
+        tmp_path, "def __init__(self, setup): setup.nothing\ndef step(self, reading): pass"
+    )
+    with pytest.raises(
+        BadCode, match=r"Mine: __init__ raised AttributeError: .*'nothing' \(mine.py:3\)"
+    ):
         controller.step(READING)
 
 
@@ -94,7 +128,13 @@ def test_what_fails_when_it_is_made_fails_at_the_first_step(tmp_path):
         ["while True: pass"],
         ["import time", "time.sleep(60)"],
         ["while True:", "    try:", "        time = 1", "    except Exception:", "        pass"],
-        ["for _ in range(3):", "    try:", "        while True: pass", "    except BaseException:", "        pass"],
+        [
+            "for _ in range(3):",
+            "    try:",
+            "        while True: pass",
+            "    except BaseException:",
+            "        pass",
+        ],
     ],
     ids=["loop", "sleep", "stubborn", "swallows it"],
 )
@@ -132,8 +172,12 @@ def test_it_also_works_in_another_thread(tmp_path):
 
 
 def test_its_random_numbers_are_those_of_its_seed(tmp_path):
-    draws = stepping("import random", "import numpy", "return random.random(), numpy.random.random()")
-    first, again, other = (own(tmp_path, draws, replace(SETUP, seed=seed)) for seed in (2**40, 2**40, 7))
+    draws = stepping(
+        "import random", "import numpy", "return random.random(), numpy.random.random()"
+    )
+    first, again, other = (
+        own(tmp_path, draws, replace(SETUP, seed=seed)) for seed in (2**40, 2**40, 7)
+    )
     answers = [controller.step(READING) for controller in (first, again, other)]
     assert answers[0] == answers[1] != answers[2]
 
@@ -195,13 +239,22 @@ def test_a_module_that_is_installed(tmp_path):
 @pytest.mark.parametrize(
     ("use", "complaint"),
     [
-        ("drives:Drive", r"there is no module 'drives' in .*, nor installed \(did you mean drive\?\)$"),
+        (
+            "drives:Drive",
+            r"there is no module 'drives' in .*, nor installed \(did you mean drive\?\)$",
+        ),
         ("drive.deep:Drive", r"there is no module 'drive.deep' in .*, nor installed"),
         ("drive:Driver", r"module 'drive' has no class 'Driver' \(did you mean Drive\?\)$"),
         ("drive:NUMBER", "module 'drive' has no class 'NUMBER'"),
         ("drive:Still", r"class 'Still' of module 'drive' has no method step\(reading\)$"),
-        ("broken:Drive", r"importing 'broken' raised ZeroDivisionError: division by zero \(broken.py:2\)$"),
-        ("unfinished:Drive", r"importing 'unfinished' raised SyntaxError: .*\(unfinished.py, line 1\)"),
+        (
+            "broken:Drive",
+            r"importing 'broken' raised ZeroDivisionError: division by zero \(broken.py:2\)$",
+        ),
+        (
+            "unfinished:Drive",
+            r"importing 'unfinished' raised SyntaxError: .*\(unfinished.py, line 1\)",
+        ),
         ("leaving:Drive", r"importing 'leaving' raised SystemExit: 0 \(leaving.py:1\)"),
         (
             "needing:Drive",

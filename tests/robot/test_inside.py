@@ -40,7 +40,9 @@ def simulators(opened):
     return Variants(*load_parts(whole), whole), Variants(*load_parts(opened), opened)
 
 
-PARTS = frozenset({"yard/posts/left", "yard/posts/right", *(f"yard/row/far_{number}" for number in range(6))})
+PARTS = frozenset(
+    {"yard/posts/left", "yard/posts/right", *(f"yard/row/far_{number}" for number in range(6))}
+)
 
 
 def bits(result):
@@ -66,4 +68,6 @@ def test_parts_that_cannot_have_affected_a_run_change_no_bit_of_it(simulators):
 def test_a_protected_model_stays_with_all_its_parts(simulators, opened):
     _, parts = simulators
     protected = opened.model_copy(update={"protected": ("yard",)})
-    assert bits(Variants(*load_parts(opened), protected).run(frozenset(), 1)) == bits(parts.run(PARTS, 1))
+    assert bits(Variants(*load_parts(opened), protected).run(frozenset(), 1)) == bits(
+        parts.run(PARTS, 1)
+    )

@@ -16,12 +16,22 @@ from ddenv.robot.result import RunResult
 
 def path(*points) -> np.ndarray:
     """A trajectory with one point a second, upright."""
-    return np.array([(float(time), *point, 1.0, 0.0, 0.0, 0.0) for time, point in enumerate(points)])
+    return np.array(
+        [(float(time), *point, 1.0, 0.0, 0.0, 0.0) for time, point in enumerate(points)]
+    )
 
 
 def result(outcome: str, trajectory: np.ndarray) -> RunResult:
     failure = {"failed": "stuck", "error": "not-finite"}.get(outcome, "")
-    return RunResult(outcome=outcome, failure=failure, trajectory=trajectory, motions={}, simulated_seconds=float(trajectory[-1, 0]), wall_seconds=0.1, seed=0)
+    return RunResult(
+        outcome=outcome,
+        failure=failure,
+        trajectory=trajectory,
+        motions={},
+        simulated_seconds=float(trajectory[-1, 0]),
+        wall_seconds=0.1,
+        seed=0,
+    )
 
 
 WAY = path((0, 0, 0), (1, 0, 0), (2, 0, 0))
@@ -30,7 +40,12 @@ F = Failure((2.0, 0.0, 0.0), WAY, epsilon=0.5)
 
 @pytest.mark.parametrize(
     ("end", "outcome"),
-    [((2, 0.5, 0), "similar"), ((2, 0.51, 0), "other"), ((2, 0, 0.5), "similar"), ((2, 0, -1), "other")],
+    [
+        ((2, 0.5, 0), "similar"),
+        ((2, 0.51, 0), "other"),
+        ((2, 0, 0.5), "similar"),
+        ((2, 0, -1), "other"),
+    ],
 )
 def test_similar_within_epsilon_in_all_three_dimensions(end, outcome):
     judgement = judge(result("failed", path((0, 0, 0), (1, 0, 0), end)), F)
@@ -49,7 +64,10 @@ def test_a_detour_to_the_same_end_is_another_failure_if_the_way_counts():
     detour = result("failed", path((0, 0, 0), (1, 5, 0), (2, 0, 0)))
     assert judge(detour, F).outcome == "similar"
     assert judge(detour, Failure(F.position, WAY, 0.5, "trajectory")).outcome == "other"
-    assert judge(result("failed", WAY), Failure(F.position, WAY, 0.5, "trajectory")).outcome == "similar"
+    assert (
+        judge(result("failed", WAY), Failure(F.position, WAY, 0.5, "trajectory")).outcome
+        == "similar"
+    )
 
 
 def test_trajectories_are_compared_at_equal_times():
@@ -69,7 +87,10 @@ def ways(draw) -> np.ndarray:
     steps = draw(st.lists(st.tuples(numbers, numbers, numbers), min_size=length, max_size=length))
     rest = draw(st.sampled_from([0.0, 0.035]))
     return np.array(
-        [(0.1 * row + (rest if row == length - 1 else 0), *step, 1, 0, 0, 0) for row, step in enumerate(steps)]
+        [
+            (0.1 * row + (rest if row == length - 1 else 0), *step, 1, 0, 0, 0)
+            for row, step in enumerate(steps)
+        ]
     )
 
 
@@ -91,7 +112,9 @@ def test_the_distance_of_trajectories_is_one(a, b):
 @given(ways(), ways())
 def test_a_run_that_was_cut_waits_at_its_end(cut, f):
     """Whether a robot that stands still is watched to the end or not makes no difference."""
-    assert trajectory_distance(cut, f) == pytest.approx(trajectory_distance(waiting(cut, f[:, 0]), f))
+    assert trajectory_distance(cut, f) == pytest.approx(
+        trajectory_distance(waiting(cut, f[:, 0]), f)
+    )
 
 
 @given(ways(), st.tuples(numbers, numbers, numbers))
@@ -106,7 +129,9 @@ def test_similar_trajectories_have_similar_ends(a, b, epsilon):
     f = Failure(tuple(b[-1, 1:4]), b, epsilon)
     along = judge(result("failed", a), replace(f, similarity="trajectory"))
     assert along.outcome == "other" or judge(result("failed", a), f).outcome == "similar"
-    assert (along.outcome == "similar") == (max(along.distance, trajectory_distance(a, b)) <= epsilon)
+    assert (along.outcome == "similar") == (
+        max(along.distance, trajectory_distance(a, b)) <= epsilon
+    )
 
 
 def way(seconds: float, place, turn=lambda t: (1.0, 0.0, 0.0, 0.0)) -> np.ndarray:

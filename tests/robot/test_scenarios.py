@@ -35,7 +35,11 @@ MORE = {
     "friction": {"red_patch_01", "barrel_09", "green_patch_03"},
 }
 # Where the robot is when its time is up, m.
-ENDS = {"ditch": (-0.29, 0.04, 2.08), "rubble": (-0.18, 0.03, 0.18), "friction": (2.15, -0.59, 0.12)}
+ENDS = {
+    "ditch": (-0.29, 0.04, 2.08),
+    "rubble": (-0.18, 0.03, 0.18),
+    "friction": (2.15, -0.59, 0.12),
+}
 # `benchmarks/failure_rates.py` has thirty seeds of each.
 SEEDS = {"ditch": 10, "rubble": 4, "friction": 10}
 REPAIRED_SEEDS = 3
@@ -47,7 +51,9 @@ def of_each(*quick: str) -> pytest.MarkDecorator:
     def marks(name: str) -> list[pytest.MarkDecorator]:
         return [pytest.mark.xdist_group(name)] + [pytest.mark.rates] * (name not in quick)
 
-    return pytest.mark.parametrize("name", [pytest.param(name, marks=marks(name)) for name in MINIMAL])
+    return pytest.mark.parametrize(
+        "name", [pytest.param(name, marks=marks(name)) for name in MINIMAL]
+    )
 
 
 @dataclass(frozen=True)
@@ -92,7 +98,11 @@ def test_the_file_is_what_its_script_writes(name, script):
 
 
 def test_they_have_the_papers_sizes():
-    assert {name: len(part(name).everything) for name in MINIMAL} == {"ditch": 43, "rubble": 36, "friction": 25}
+    assert {name: len(part(name).everything) for name in MINIMAL} == {
+        "ditch": 43,
+        "rubble": 36,
+        "friction": 25,
+    }
     assert all(model.static for model in part("ditch").world.models)
     boards = [model for model in part("rubble").world.models if not model.static]
     assert len(boards) == 34
@@ -101,7 +111,9 @@ def test_they_have_the_papers_sizes():
 
 def test_the_friction_of_patches_differs_a_thousandfold():
     mus = {model.name: model.collisions[0].mu for model in part("friction").world.models}
-    red, green = ({mu for name, mu in mus.items() if name.startswith(color)} for color in ("red", "green"))
+    red, green = (
+        {mu for name, mu in mus.items() if name.startswith(color)} for color in ("red", "green")
+    )
     assert max(red) / min(green) == pytest.approx(1000)
     assert max(green) < mus["ground_plane"] < min(red)
 
@@ -131,12 +143,17 @@ def test_it_reaches_its_goal_where_the_cause_is_taken_away(name, script):
 def failure(name: str) -> Failure:
     """f, as a run of the whole world has it that ends where most do."""
     runs = (whole(name, seed) for seed in range(SEEDS[name]))
-    first = next(run for run in runs if np.linalg.norm(np.subtract(run.end_pose[:3], ENDS[name])) < 0.15)
+    first = next(
+        run for run in runs if np.linalg.norm(np.subtract(run.end_pose[:3], ENDS[name])) < 0.15
+    )
     return Failure(first.end_pose[:3], first.trajectory, part(name).scenario.failure.epsilon)
 
 
 def shows_f(name: str, keep: set[str], seeds: range) -> list[bool]:
-    return [judge(part(name).template.run(frozenset(keep), seed), failure(name)).outcome == "similar" for seed in seeds]
+    return [
+        judge(part(name).template.run(frozenset(keep), seed), failure(name)).outcome == "similar"
+        for seed in seeds
+    ]
 
 
 @of_each()
@@ -167,7 +184,9 @@ def test_a_used_context_gives_the_same_bits_as_a_fresh_one(name):
 @of_each("friction")
 def test_switching_models_off_gives_the_same_bits_as_building_without_them(name):
     world = part(name).world
-    smaller = replace(world, models=tuple(one for one in world.models if one.name in few(name) | {"ground_plane"}))
+    smaller = replace(
+        world, models=tuple(one for one in world.models if one.name in few(name) | {"ground_plane"})
+    )
     template = Template(smaller, part(name).robot, part(name).scenario)
     assert bits(template.run(few(name), seed=5)) == bits_of_few(name)
 
@@ -180,5 +199,11 @@ def test_another_process_gives_the_same_bits(name):
 
 
 def bits(result: RunResult) -> bytes:
-    motions = b"".join(name.encode() + rows.tobytes() for name, rows in sorted(result.motions.items()))
-    return result.trajectory.tobytes() + motions + repr((result.first_sensed, result.first_touched)).encode()
+    motions = b"".join(
+        name.encode() + rows.tobytes() for name, rows in sorted(result.motions.items())
+    )
+    return (
+        result.trajectory.tobytes()
+        + motions
+        + repr((result.first_sensed, result.first_touched)).encode()
+    )

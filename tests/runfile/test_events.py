@@ -73,13 +73,18 @@ def test_a_field_that_is_missing_is_named(written):
         for field in fields(event):
             if field.default is MISSING:
                 less = {name: value for name, value in data.items() if name != field.name}
-                assert complaint(kind, less) == f"damaged run file: event 7 ({kind}): {field.name}: is missing"
+                assert (
+                    complaint(kind, less)
+                    == f"damaged run file: event 7 ({kind}): {field.name}: is missing"
+                )
 
 
 def test_a_field_that_nobody_knows_is_named(written):
     for kind, event in written.items():
         wrong = complaint(kind, plain(event) | {"nob\x1bdy": 1})
-        assert wrong == f"damaged run file: event 7 ({kind}): 'nob\\x1bdy': is not one of its fields"
+        assert (
+            wrong == f"damaged run file: event 7 ({kind}): 'nob\\x1bdy': is not one of its fields"
+        )
 
 
 def test_a_number_that_cannot_be_is_named(written):
@@ -92,7 +97,9 @@ def test_a_number_that_cannot_be_is_named(written):
             # A negative process is nonsense to nobody who reads it.
             for value in NONSENSE[field.name in ("pid", "seconds") :]:
                 wrong = complaint(kind, data | {field.name: value})
-                assert wrong.startswith(f"damaged run file: event 7 ({kind}): {field.name}: should be"), wrong
+                assert wrong.startswith(
+                    f"damaged run file: event 7 ({kind}): {field.name}: should be"
+                ), wrong
                 assert ", found " in wrong and wrong.isprintable() and len(wrong) < 160
                 checked += 1
     assert checked > 300
@@ -113,9 +120,17 @@ def test_a_number_that_cannot_be_is_named(written):
             "candidates: 0: 0: should be 'partition' or 'complement'",
         ),
         ("environment_named", {"models": "xyz"}, "models: should be hexadecimal digits"),
-        ("baseline_finished", {"judged": {"outcomes": {"x": "pass"}}}, "judged: outcomes: x: '[key]': should be a"),
+        (
+            "baseline_finished",
+            {"judged": {"outcomes": {"x": "pass"}}},
+            "judged: outcomes: x: '[key]': should be a",
+        ),
         ("baseline_finished", {"rate": 1.5}, "rate: should be less than or equal to 1, found 1.5"),
-        ("certificate_finished", {"claims": [{"without": 0}]}, "claims: 0: environment: is missing"),
+        (
+            "certificate_finished",
+            {"claims": [{"without": 0}]},
+            "claims: 0: environment: is missing",
+        ),
         ("finished", {"minimal": 1}, "minimal: should be a valid boolean, found 1"),
         ("finished", {"reason": ["[" * 500]}, "reason: should be a valid string, found ["),
         ("engine_started", {"command": -1}, "command: should be a whole number"),

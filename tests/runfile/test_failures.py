@@ -39,9 +39,13 @@ def test_each_run_is_in_one_group_and_close_to_its_centre(ends):
 
 
 @given(ENDS)
-def test_the_first_centre_has_the_most_others_around_it_then_the_nearest_ones_then_it_is_the_earliest(ends):
+def test_the_first_centre_has_the_most_others_around_it_then_the_nearest_ones_then_it_is_the_earliest(
+    ends,
+):
     def rank(one: int) -> tuple[int, float, int]:
-        around = [distance for other in ends if (distance := math.dist(ends[one], other)) <= EPSILON]
+        around = [
+            distance for other in ends if (distance := math.dist(ends[one], other)) <= EPSILON
+        ]
         return -len(around), math.fsum(around), one
 
     groups = alike(ends, EPSILON)
@@ -49,18 +53,29 @@ def test_the_first_centre_has_the_most_others_around_it_then_the_nearest_ones_th
         assert groups[0][0] == min(range(len(ends)), key=rank)
         # The next ones are found in the same way among the rest.
         rest = [one for one in range(len(ends)) if one not in groups[0]]
-        assert [[rest[one] for one in group] for group in alike([ends[one] for one in rest], EPSILON)] == groups[1:]
+        assert [
+            [rest[one] for one in group] for group in alike([ends[one] for one in rest], EPSILON)
+        ] == groups[1:]
 
 
 def test_a_group_is_found_among_scattered_ends():
     """The medoid of these is a scattered one."""
     together = [(0.05 * number, 0.0, 0.0) for number in range(4)]
-    scattered = [(2.0, 2.0, 0.0), (3.0, -2.0, 0.0), (4.0, 1.5, 0.0), (5.0, -1.0, 0.0), (3.5, 4.0, 0.0)]
+    scattered = [
+        (2.0, 2.0, 0.0),
+        (3.0, -2.0, 0.0),
+        (4.0, 1.5, 0.0),
+        (5.0, -1.0, 0.0),
+        (3.5, 4.0, 0.0),
+    ]
     assert alike([*scattered, *together], 0.33)[0] == [6, 5, 7, 8]
 
 
 def test_what_is_no_distance_is_another_failure():
-    assert grouped(3, lambda first, second: 0.0 if (first, second) == (0, 2) else None) == [[0, 2], [1]]
+    assert grouped(3, lambda first, second: 0.0 if (first, second) == (0, 2) else None) == [
+        [0, 2],
+        [1],
+    ]
     assert grouped(0, lambda *_: 0.0) == []
 
 
@@ -80,10 +95,14 @@ Test.__test__ = False
     moment=st.integers(20, 200),
     early_stop=st.booleans(),
 )
-def test_each_other_failure_is_found_with_the_smallest_environment_that_showed_it(salt, plan, moment, early_stop):
+def test_each_other_failure_is_found_with_the_smallest_environment_that_showed_it(
+    salt, plan, moment, early_stop
+):
     with tempfile.TemporaryDirectory() as folder:
         path = new_run(Path(folder), early_stop=early_stop)
-        pool = Disturbed(path, flaky(salt, "wall", "beam"), 2, sorted(plan, key=lambda one: one[0]), salt)
+        pool = Disturbed(
+            path, flaky(salt, "wall", "beam"), 2, sorted(plan, key=lambda one: one[0]), salt
+        )
         with closing(pool.viewer):
             killed(path, pool, [moment])
         state = state_of(path)
@@ -97,7 +116,18 @@ def test_each_other_failure_is_found_with_the_smallest_environment_that_showed_i
 
 def met(*ends: tuple[str, float]) -> RunState:
     tests = [
-        Test(id=id, environment=0, phase="baseline", round=None, candidate=None, run=id, seed=id, outcome="other", failure=kind, end_pose=(x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+        Test(
+            id=id,
+            environment=0,
+            phase="baseline",
+            round=None,
+            candidate=None,
+            run=id,
+            seed=id,
+            outcome="other",
+            failure=kind,
+            end_pose=(x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+        )
         for id, (kind, x) in enumerate(ends, 1)
     ]
     empty = RunState()
@@ -111,7 +141,16 @@ def met(*ends: tuple[str, float]) -> RunState:
 
 
 def test_failures_are_told_apart_by_end_and_by_kind():
-    found = atlas(met(("stuck", 1.0), ("fell", 1.1), ("stuck", 5.0), ("stuck", 1.4), ("stuck", 1.3), ("fell", 1.2)))
+    found = atlas(
+        met(
+            ("stuck", 1.0),
+            ("fell", 1.1),
+            ("stuck", 5.0),
+            ("stuck", 1.4),
+            ("stuck", 1.3),
+            ("fell", 1.2),
+        )
+    )
     assert [(each.name, each.tests) for each in found] == [
         ("stuck at (1.30, 0.00)", (1, 4, 5)),
         ("fell at (1.10, 0.00)", (2, 6)),

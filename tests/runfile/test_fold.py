@@ -37,9 +37,13 @@ def read_back(*happened: tuple[str, dict]) -> RunState:
     return fold([recorded(number, 0.0, kind, json.dumps(data)) for number, (kind, data) in rows])
 
 
-def round_event(partitions: list[list[int]], environment=range(6), number: int = 1) -> tuple[str, dict]:
+def round_event(
+    partitions: list[list[int]], environment=range(6), number: int = 1
+) -> tuple[str, dict]:
     """A round whose candidates are each partition and its complement."""
-    candidates = [[kind, part, 1.0] for part in range(len(partitions)) for kind in ("partition", "complement")]
+    candidates = [
+        [kind, part, 1.0] for part in range(len(partitions)) for kind in ("partition", "complement")
+    ]
     split = {"environment": list(environment), "partitions": partitions, "candidates": candidates}
     return "round_started", {"round": number, "n_partitions": len(partitions), **split}
 
@@ -51,7 +55,13 @@ def started(test: int = 1, candidate: int | None = None, run: int = 0) -> tuple[
 
 
 def finished(test: int = 1, outcome: str = "pass", **more) -> tuple[str, dict]:
-    end = {"failure": "", "distance": 0.5, "end_pose": None, "simulated_seconds": 2.0, "wall_seconds": 1.0}
+    end = {
+        "failure": "",
+        "distance": 0.5,
+        "end_pose": None,
+        "simulated_seconds": 2.0,
+        "wall_seconds": 1.0,
+    }
     end |= {"first_sensed": [], "first_touched": [], "cut": False}
     return "test_finished", {"test": test, "outcome": outcome, **end, **more}
 
@@ -70,7 +80,9 @@ def test_a_candidate_has_the_models_of_its_partition_or_all_others_in_their_orde
         ("box 5", "box 3"),
         ("box 0", "box 1", "box 4"),
     ]
-    assert [candidate.size for candidate in state.round.candidates] == [len(each) for each in models]
+    assert [candidate.size for candidate in state.round.candidates] == [
+        len(each) for each in models
+    ]
 
 
 def test_a_part_keeps_its_letter_from_round_to_round():
@@ -83,7 +95,10 @@ def test_a_part_keeps_its_letter_from_round_to_round():
     labels = []
     for number, parts in enumerate(rounds, 1):
         everything = sorted(model for part in parts for model in part)
-        events = [round_event(earlier, number=place) for place, earlier in enumerate(rounds[: number - 1], 1)]
+        events = [
+            round_event(earlier, number=place)
+            for place, earlier in enumerate(rounds[: number - 1], 1)
+        ]
         state = state_after(*events, round_event(parts, environment=everything, number=number))
         labels.append([one.label for one in state.round.candidates if one.kind == "partition"])
         assert [state.round.split.letter_of[f"box {part[0]}"] for part in parts] == [
@@ -154,25 +169,54 @@ def test_rounds_that_make_no_sense_are_told(changed):
 @pytest.mark.parametrize("key", ["first_sensed", "first_touched"])
 @pytest.mark.parametrize(
     "pair",
-    [[6, 1.0], [-1, 1.0], [0.0, 1.0], ["0", 1.0], [0, -0.1], [0, "nan"], [0, "inf"], [0, None], [0, 10**400], [0], 0],
+    [
+        [6, 1.0],
+        [-1, 1.0],
+        [0.0, 1.0],
+        ["0", 1.0],
+        [0, -0.1],
+        [0, "nan"],
+        [0, "inf"],
+        [0, None],
+        [0, 10**400],
+        [0],
+        0,
+    ],
     ids=lambda pair: str(pair)[:12],
 )
 def test_sensed_models_that_make_no_sense_are_told(key, pair):
     with pytest.raises(UserError, match=r"damaged run file: event 3 \(test_finished\)"):
-        read_back((started()[0], started()[1] | {"environment": 0}), finished(**{key: [[1, 1.0], pair]}))
+        read_back(
+            (started()[0], started()[1] | {"environment": 0}), finished(**{key: [[1, 1.0], pair]})
+        )
 
 
 def test_full_runs_of_what_is_left_are_told_apart():
-    whole, one = ({**started(test)[1], "phase": "certify", "without": left} for test, left in ((2, None), (3, 4)))
-    terms = {"certificate": 1, "run": 0, "keep_rate": 0.8, "rate": 0.9, "error": 0.05, "at_least": 10}
-    state = state_after(started(1), ("certificate_started", terms), ("test_started", whole), ("test_started", one))
+    whole, one = (
+        {**started(test)[1], "phase": "certify", "without": left}
+        for test, left in ((2, None), (3, 4))
+    )
+    terms = {
+        "certificate": 1,
+        "run": 0,
+        "keep_rate": 0.8,
+        "rate": 0.9,
+        "error": 0.05,
+        "at_least": 10,
+    }
+    state = state_after(
+        started(1), ("certificate_started", terms), ("test_started", whole), ("test_started", one)
+    )
     assert state.confirming
     assert [(test.id, test.without) for test in state.confirm_tests] == [(2, None), (3, "box 4")]
     assert [len(state.models_of(test)) for test in state.confirm_tests] == [6, 5]
     assert state.deflake_runs == 0
 
 
-@given(steps=st.lists(st.sampled_from(["round", "certify", "certificate"]), max_size=12), early=st.integers(0, 2))
+@given(
+    steps=st.lists(st.sampled_from(["round", "certify", "certificate"]), max_size=12),
+    early=st.integers(0, 2),
+)
 def test_the_tests_of_the_last_certificate_are_found_whenever_they_were_made(steps, early):
     """Some are made before it starts."""
     state, first, made = state_after(), 0, 0
@@ -184,13 +228,30 @@ def test_the_tests_of_the_last_certificate_are_found_whenever_they_were_made(ste
         else:
             run = first + 50 * early if step == "certify" else 0
             where = {"round": None, "candidate": None, "run": run, "seed": run}
-            state = with_event(state, "test_started", test=len(state.tests) + 1, phase=step, **where)
-    assert state.confirm_tests == tuple(one for one in state.tests if one.phase == "certify" and one.run >= first)
+            state = with_event(
+                state, "test_started", test=len(state.tests) + 1, phase=step, **where
+            )
+    assert state.confirm_tests == tuple(
+        one for one in state.tests if one.phase == "certify" and one.run >= first
+    )
 
 
 def test_baseline_runs_count_as_what_they_turned_out_to_be():
-    told = {"runs": 2, "failures": 1, "rate": 0.5, "low": 0.1, "high": 0.9, "failure_test": 1, "iterations_95": 4}
-    more = {"position": [0, 0, 0], "miss_chance": 0.1, "outcomes": {"1": "similar"}, "distances": {"1": 0.0}}
+    told = {
+        "runs": 2,
+        "failures": 1,
+        "rate": 0.5,
+        "low": 0.1,
+        "high": 0.9,
+        "failure_test": 1,
+        "iterations_95": 4,
+    }
+    more = {
+        "position": [0, 0, 0],
+        "miss_chance": 0.1,
+        "outcomes": {"1": "similar"},
+        "distances": {"1": 0.0},
+    }
     state = state_after(started(1), finished(1, "failed"), started(2), finished(2, "pass"))
     assert state.outcomes() == dict.fromkeys(OUTCOMES, 0) | {"pass": 1, "failed": 1}
     state = with_event(state, "baseline_finished", **told, **more)
@@ -201,7 +262,9 @@ def test_baseline_runs_count_as_what_they_turned_out_to_be():
 # Whole runs.
 
 moves = st.tuples(
-    st.sampled_from(["start", "start", "finish", "finish", "lose", "judge", "veto", "round", "reduce", "pause"]),
+    st.sampled_from(
+        ["start", "start", "finish", "finish", "lose", "judge", "veto", "round", "reduce", "pause"]
+    ),
     st.integers(0, 10**6),
 )
 
@@ -217,17 +280,30 @@ def next_event(state: RunState, move: str, number: int) -> tuple[str, dict] | No
             return "test_started", place
         case "finish" if running:
             outcome = OUTCOMES[number % len(OUTCOMES)]
-            return finished(running[number % len(running)], outcome, first_sensed=[[number % 6, 1.0]])
+            return finished(
+                running[number % len(running)], outcome, first_sensed=[[number % 6, 1.0]]
+            )
         case "lose" if tests:
             return "test_lost", {"test": 1 + number % tests}
         case "judge":
-            return "candidate_judged", {"candidate": candidate, "verdict": "dissimilar", "tests": [], "known": 0}
+            return "candidate_judged", {
+                "candidate": candidate,
+                "verdict": "dissimilar",
+                "tests": [],
+                "known": 0,
+            }
         case "veto":
             return "vetoed", {"candidate": candidate, "verdict": "vetoed"}
         case "round":
-            return round_event([[index] for index in range(1 + number % 6)], number=state.round.number + 1)
+            return round_event(
+                [[index] for index in range(1 + number % 6)], number=state.round.number + 1
+            )
         case "reduce":
-            return "reduced", {"candidate": candidate, "environment": [number % 6], "evidence_test": 1}
+            return "reduced", {
+                "candidate": candidate,
+                "environment": [number % 6],
+                "evidence_test": 1,
+            }
         case "pause":
             return ("resumed" if state.paused else "paused"), {}
     return None
@@ -267,7 +343,9 @@ def test_what_is_counted_along_the_way_is_what_the_tests_say(steps):
             assert state.tests_done == len(done)
             assert state.running_tests == tuple(test for test in tests if test.outcome == "running")
             assert state.deflake_runs == sum(test.run > 0 for test in done)
-            assert state.outcomes() == {name: sum(test.outcome == name for test in done) for name in OUTCOMES}
+            assert state.outcomes() == {
+                name: sum(test.outcome == name for test in done) for name in OUTCOMES
+            }
 
 
 @given(st.lists(moves, max_size=20))

@@ -27,7 +27,9 @@ def test_it_is_read_like_a_tuple(length):
     assert (len(found), bool(found)) == (length, bool(plain))
     assert tuple(found) == plain
     assert tuple(reversed(found)) == plain[::-1]
-    assert [found[index] for index in range(-length, length)] == [plain[index] for index in range(-length, length)]
+    assert [found[index] for index in range(-length, length)] == [
+        plain[index] for index in range(-length, length)
+    ]
     for index in (length, -length - 1):
         with pytest.raises(IndexError):
             found[index]
@@ -55,7 +57,9 @@ def test_earlier_ones_stay_and_later_ones_have_the_change(length, places):
 def test_a_change_copies_one_chunk():
     before = numbers(10 * CHUNK)
     after = before.changed(3 * CHUNK + 1, -1)
-    assert [one is other for one, other in zip(before.chunks, after.chunks, strict=True)].count(False) == 1
+    assert [one is other for one, other in zip(before.chunks, after.chunks, strict=True)].count(
+        False
+    ) == 1
     grown = before.added(-1)
     assert all(one is other for one, other in zip(before.chunks, grown.chunks, strict=False))
 

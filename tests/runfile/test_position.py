@@ -30,7 +30,13 @@ def happened(rounds: list[list[int]]) -> list[Recorded]:
             ids = []
             for run in range(runs):
                 test += 1
-                place = {"phase": "round", "round": number, "candidate": candidate, "run": run, "seed": run}
+                place = {
+                    "phase": "round",
+                    "round": number,
+                    "candidate": candidate,
+                    "run": run,
+                    "seed": run,
+                }
                 found.append(("test_started", {"test": test, **place}))
                 found.append(("test_finished", {"test": test, **ENDED}))
                 ids.append(test)
@@ -42,10 +48,18 @@ def happened(rounds: list[list[int]]) -> list[Recorded]:
             found.append(("reduced", {"candidate": 0, "environment": kept, "evidence_test": test}))
         found.append(("round_finished", {}))
     # Ids of events need not follow each other.
-    return [Recorded(3 * place + 1, float(place), one.event) for place, one in enumerate(story(found))]
+    return [
+        Recorded(3 * place + 1, float(place), one.event) for place, one in enumerate(story(found))
+    ]
 
 
-ENDED = {"outcome": "pass", "failure": "", "distance": None, "end_pose": None, "simulated_seconds": 1.0}
+ENDED = {
+    "outcome": "pass",
+    "failure": "",
+    "distance": None,
+    "end_pose": None,
+    "simulated_seconds": 1.0,
+}
 ENDED |= {"wall_seconds": 1.0, "first_sensed": [], "first_touched": [], "cut": False}
 runs = st.lists(st.lists(st.integers(0, 4), min_size=2, max_size=2), max_size=4).map(happened)
 
@@ -81,10 +95,17 @@ def test_steps_back_and_on_pass_the_same_places(events, what):
 
 def test_a_round_ends_with_what_it_showed():
     position = position_in(happened([[1, 2], [2, 0]]))
-    assert [(each.kind, each.number) for each in position.chapters] == [("baseline", 0), ("round", 1), ("round", 2)]
+    assert [(each.kind, each.number) for each in position.chapters] == [
+        ("baseline", 0),
+        ("round", 1),
+        ("round", 2),
+    ]
     assert position.step("round", -1)
     assert position.now.round.number == 1
-    assert [candidate.verdict for candidate in position.now.round.candidates] == ["dissimilar", "dissimilar"]
+    assert [candidate.verdict for candidate in position.now.round.candidates] == [
+        "dissimilar",
+        "dissimilar",
+    ]
     assert [(each.models, each.left) for each in position.chapters[1:]] == [(8, 4), (4, 2)]
     assert position.step("round", -1)
     assert position.now.round is None

@@ -30,4 +30,6 @@ def test_something_falls_only_if_it_loses_something_that_it_rested_on(supports, 
         assert (name in fallen) == bool(below & (set(world) - keep) or below & fallen)
     assert dropped(supports, world, world) == ()
     # What is kept besides changes nothing for what has lost its hold directly.
-    assert {upper for upper, lower in supports if upper in keep and lower in set(world) - keep} <= fallen
+    assert {
+        upper for upper, lower in supports if upper in keep and lower in set(world) - keep
+    } <= fallen

@@ -15,14 +15,31 @@ from ddenv.runfile.events import Created, Paused, RoundStarted, TestFinished
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.state import partition_letter
-from ddenv.runfile.store import LOGS, ROBOT, SCHEMA_VERSION, Live, Recorded, RunFile, create, recorded
+from ddenv.runfile.store import (
+    LOGS,
+    ROBOT,
+    SCHEMA_VERSION,
+    Live,
+    Recorded,
+    RunFile,
+    create,
+    recorded,
+)
 
 CREATED = Created(scenario={}, elements=("Häuser",))
 TestFinished.__test__ = False
 
 
 def ended(failure: str = "") -> TestFinished:
-    return TestFinished(test=1, outcome="pass", failure=failure, distance=None, end_pose=None, simulated_seconds=2.0, wall_seconds=1.0)
+    return TestFinished(
+        test=1,
+        outcome="pass",
+        failure=failure,
+        distance=None,
+        end_pose=None,
+        simulated_seconds=2.0,
+        wall_seconds=1.0,
+    )
 
 
 @pytest.fixture
@@ -52,11 +69,17 @@ def test_documents_events_commands_and_motions_come_back(path):
         assert viewer.motion(2) is None
         assert viewer.document("world") == b"<sdf/>"
         assert viewer.send("veto", round=1, candidate=2) == 1
-        assert [(one.kind, one.data) for one in engine.commands()] == [("veto", {"round": 1, "candidate": 2})]
+        assert [(one.kind, one.data) for one in engine.commands()] == [
+            ("veto", {"round": 1, "candidate": 2})
+        ]
         engine.set_live([Live(slot=1, test=7, time=0.5, pose=(1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0))])
-        assert viewer.live() == [Live(slot=1, test=7, time=0.5, pose=(1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0))]
+        assert viewer.live() == [
+            Live(slot=1, test=7, time=0.5, pose=(1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0))
+        ]
         board = {"board": (3.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0)}
-        engine.set_live([Live(slot=1, test=7, time=0.5, pose=(1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0), models=board)])
+        engine.set_live(
+            [Live(slot=1, test=7, time=0.5, pose=(1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0), models=board)]
+        )
         assert viewer.live()[0].models == board
 
 
@@ -83,7 +106,11 @@ def _killed(path):
     with RunFile(path) as file:
         file.own()
         file.append(Paused())
-        logs = {log: log.read_bytes() for ending in LOGS if (log := path.with_name(path.name + ending)).exists()}
+        logs = {
+            log: log.read_bytes()
+            for ending in LOGS
+            if (log := path.with_name(path.name + ending)).exists()
+        }
     path.unlink()
     for log, content in logs.items():
         log.write_bytes(content)
@@ -101,7 +128,10 @@ def test_a_new_run_has_nothing_of_a_deleted_one_that_was_killed(path):
 
 def test_a_deleted_run_is_not_replaced_while_its_engine_works(path):
     logs = _killed(path)
-    with engine_lock(path), pytest.raises(UserError, match="an engine is still working on a deleted run of this name"):
+    with (
+        engine_lock(path),
+        pytest.raises(UserError, match="an engine is still working on a deleted run of this name"),
+    ):
         create(path, {}, CREATED)
     assert not path.exists()
     assert all(log.exists() for log in logs)
@@ -138,7 +168,10 @@ def test_files_that_are_no_run_files(tmp_path):
 @pytest.mark.parametrize(
     ("version", "words"),
     [(SCHEMA_VERSION + 1, "written by a newer ddenv")]
-    + [(old, rf"before its first release \(format {old}\); this one reads format 8") for old in (1, 4, 6)],
+    + [
+        (old, rf"before its first release \(format {old}\); this one reads format 8")
+        for old in (1, 4, 6)
+    ],
 )
 def test_a_file_of_another_format_is_refused(path, version, words):
     _sql(path, f"PRAGMA user_version = {version}")
@@ -165,9 +198,14 @@ def test_damage_is_told_and_not_thrown(path):
 
 
 def test_a_file_that_another_program_locks_is_not_called_damaged(path):
-    with RunFile(path, wait=0.05) as file, closing(sqlite3.connect(path, isolation_level=None)) as other:
+    with (
+        RunFile(path, wait=0.05) as file,
+        closing(sqlite3.connect(path, isolation_level=None)) as other,
+    ):
         other.execute("BEGIN EXCLUSIVE")
-        with pytest.raises(UserError, match="cannot be read now: database is locked by another program; try again"):
+        with pytest.raises(
+            UserError, match="cannot be read now: database is locked by another program; try again"
+        ):
             file.events()
         other.execute("ROLLBACK")
         assert file.events()
@@ -177,7 +215,9 @@ def test_a_full_disk_is_one_line_and_loses_nothing(path):
     with RunFile(path) as file:
         file.own()
         file.append(Paused())
-        file._db.execute(f"PRAGMA max_page_count = {file._db.execute('PRAGMA page_count').fetchone()[0]}")
+        file._db.execute(
+            f"PRAGMA max_page_count = {file._db.execute('PRAGMA page_count').fetchone()[0]}"
+        )
         with pytest.raises(UserError, match=r"full; its content is intact"):
             file.append(ended("y" * 100_000), {ROBOT: bytes(64_000)})
         assert [event.kind for event in file.events()] == ["created", "paused"]
@@ -188,7 +228,10 @@ def test_one_engine_a_run(path):
     assert not engine_is_alive(path)
     with engine_lock(path):
         assert engine_is_alive(path)
-        with pytest.raises(UserError, match="another engine is working on this run"), engine_lock(path):
+        with (
+            pytest.raises(UserError, match="another engine is working on this run"),
+            engine_lock(path),
+        ):
             pass
     assert not engine_is_alive(path)
 
@@ -199,18 +242,41 @@ def test_partition_letters_go_on_after_z():
 
 
 kinds = st.sampled_from(
-    ["created", "test_started", "test_finished", "round_started", "reduced", "vetoed", "decided", "x"]
+    [
+        "created",
+        "test_started",
+        "test_finished",
+        "round_started",
+        "reduced",
+        "vetoed",
+        "decided",
+        "x",
+    ]
 )
-values = st.recursive(st.none() | st.integers(-3, 5) | st.text(max_size=3), lambda inner: st.lists(inner, max_size=3))
+values = st.recursive(
+    st.none() | st.integers(-3, 5) | st.text(max_size=3), lambda inner: st.lists(inner, max_size=3)
+)
 names = st.sampled_from(
-    ["test", "round", "candidate", "elements", "scenario", "partitions", "environment", "candidates"]
+    [
+        "test",
+        "round",
+        "candidate",
+        "elements",
+        "scenario",
+        "partitions",
+        "environment",
+        "candidates",
+    ]
 )
 
 
 @given(entries=st.lists(st.tuples(kinds, st.dictionaries(names, values)), max_size=8))
 def test_events_that_make_no_sense_are_told_in_one_line(entries):
     try:
-        fold(recorded(index + 1, 0.0, kind, json.dumps(data)) for index, (kind, data) in enumerate(entries))
+        fold(
+            recorded(index + 1, 0.0, kind, json.dumps(data))
+            for index, (kind, data) in enumerate(entries)
+        )
     except UserError as error:
         assert "damaged run file" in str(error)
 
@@ -220,7 +286,9 @@ VIEW = f"CREATE VIEW event AS {NUMBERS} SELECT id, 0 AS time, '' AS kind, '' AS 
 TRIGGER = "CREATE TRIGGER t AFTER INSERT ON command BEGIN DELETE FROM event; END"
 
 
-@pytest.mark.parametrize("statements", [("DROP TABLE event", VIEW), (TRIGGER,)], ids=["view", "trigger"])
+@pytest.mark.parametrize(
+    "statements", [("DROP TABLE event", VIEW), (TRIGGER,)], ids=["view", "trigger"]
+)
 def test_a_view_in_the_place_of_a_table_and_a_trigger_are_refused(path, statements):
     _sql(path, *statements)
     with pytest.raises(UserError, match="its tables are not those of a run file"):
@@ -230,7 +298,9 @@ def test_a_view_in_the_place_of_a_table_and_a_trigger_are_refused(path, statemen
 DEEP = "[" * 100_000
 
 
-@pytest.mark.parametrize("data", [DEEP, "[]", "3", "{", "null"], ids=["deep", "list", "number", "cut", "null"])
+@pytest.mark.parametrize(
+    "data", [DEEP, "[]", "3", "{", "null"], ids=["deep", "list", "number", "cut", "null"]
+)
 def test_entries_that_are_no_objects_are_told(path, data):
     _sql(path, f"INSERT INTO event (time, kind, data) VALUES (0, 'paused', '{data}')")
     with RunFile(path) as file, pytest.raises(UserError, match="damaged run file"):
@@ -246,12 +316,25 @@ def test_a_running_test_without_a_pose_is_told(path, pose):
 
 @pytest.mark.parametrize(
     ("partitions", "candidates"),
-    [(((0,),), (("complement", 0, None),) * 100_000), (((10**12,),), ()), (((10**7,),) * 10_000, ())],
+    [
+        (((0,),), (("complement", 0, None),) * 100_000),
+        (((10**12,),), ()),
+        (((10**7,),) * 10_000, ()),
+    ],
     ids=["candidates", "a model", "models"],
 )
 def test_a_small_file_cannot_fill_the_memory(partitions, candidates):
     elements = tuple(str(number) for number in range(1000))
-    events = [Recorded(1, 0.0, Created(scenario={}, elements=elements)), Recorded(2, 0.0, RoundStarted(round=1, n_partitions=2, environment=0, partitions=partitions, candidates=candidates))]
+    events = [
+        Recorded(1, 0.0, Created(scenario={}, elements=elements)),
+        Recorded(
+            2,
+            0.0,
+            RoundStarted(
+                round=1, n_partitions=2, environment=0, partitions=partitions, candidates=candidates
+            ),
+        ),
+    ]
     with pytest.raises(UserError, match="is invalid"):
         fold(events)
 

@@ -38,7 +38,10 @@ def test_pauses_and_waiting_do_not_count(first):
     decided = (40.0, "decided", {"candidate": 0, "decision": "reject"})
     assert spent(at(first, decided, paused[0]), 60.0) == 10.0
     assert spent(at(first, decided, *paused), 92.0) == 12.0
-    assert spent(at(first, decided, *paused, (100.0, "engine_stopped", {"reason": "x"})), 500.0) == 20.0
+    assert (
+        spent(at(first, decided, *paused, (100.0, "engine_stopped", {"reason": "x"})), 500.0)
+        == 20.0
+    )
 
 
 def test_a_full_disk_and_jumps_of_the_clock_do_not_count(first):
@@ -47,8 +50,13 @@ def test_a_full_disk_and_jumps_of_the_clock_do_not_count(first):
         (50.0, "disk_space", {"enough": False, "needed": 10, "free": 1}),
         (90.0, "disk_space", {"enough": True, "needed": 10, "free": 20}),
     )
-    assert at(first, decided, full[0]).needs_room == 10 and spent(at(first, decided, full[0]), 60.0) == 10.0
-    assert at(first, decided, *full).needs_room == 0 and spent(at(first, decided, *full), 95.0) == 15.0
+    assert (
+        at(first, decided, full[0]).needs_room == 10
+        and spent(at(first, decided, full[0]), 60.0) == 10.0
+    )
+    assert (
+        at(first, decided, *full).needs_room == 0 and spent(at(first, decided, *full), 95.0) == 15.0
+    )
     # The machine slept for 1,000 s after 20 s of work.
     slept = at(first, decided, (1060.0, "clock_jumped", {"seconds": 1000.0}))
     assert spent(slept, 1065.0) == 25.0

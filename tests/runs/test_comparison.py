@@ -10,7 +10,9 @@ from tests.command import in_process
 from tests.conftest import DATA
 
 
-def test_settings_and_models_that_differ_are_listed_and_nothing_else(home, tmp_path, monkeypatch, capsys):
+def test_settings_and_models_that_differ_are_listed_and_nothing_else(
+    home, tmp_path, monkeypatch, capsys
+):
     runs_folder().mkdir(parents=True)
     create_run(load_scenario(DATA / "wall.yaml"), runs_folder() / "wall-1.ddenv")
     text = (
@@ -24,7 +26,9 @@ def test_settings_and_models_that_differ_are_listed_and_nothing_else(home, tmp_p
     (tmp_path / "wall.sdf").write_text(world.replace("<pose>-3 4 ", "<pose>-3 5 "))
 
     said = in_process(monkeypatch, capsys, "diff", "wall-1", tmp_path / "moved.yaml", "--json")
-    rows = {row["what"]: (row["first"], row["second"]) for row in json.loads(said.stdout)["differences"]}
+    rows = {
+        row["what"]: (row["first"], row["second"]) for row in json.loads(said.stdout)["differences"]
+    }
     assert rows.keys() == {"run", "reduction.iterations", "far_box"}
     assert rows["reduction.iterations"] == ("1", "4")
     one, other = rows["far_box"]

@@ -38,7 +38,9 @@ def hall(tmp_path):
 
 
 def run_of(world, protected=()):
-    scenario = scenario_for_world(world, (0, 0, 0.2, 0), (6, 0)).model_copy(update={"protected": protected})
+    scenario = scenario_for_world(world, (0, 0, 0.2, 0), (6, 0)).model_copy(
+        update={"protected": protected}
+    )
     run = world.parent.with_name("run.ddenv")
     create_run(scenario, run)
     return run
@@ -76,7 +78,9 @@ def test_what_is_left_is_directives_again_and_the_run_file_needs_no_other_file(h
     shutil.copytree(target, hall.parent)
     with pytest.raises(UserError, match=r"minimal\.sdf: .*\.dmd\.yaml"):
         export_world(run, target / "minimal.sdf", None)
-    assert export_world(run, target / "minimal.dmd.yaml", target / "minimal.yaml").needs == ["box.sdf"]
+    assert export_world(run, target / "minimal.dmd.yaml", target / "minimal.yaml").needs == [
+        "box.sdf"
+    ]
     assert (target / "minimal.dmd.yaml").read_text() == "\n".join(HALL.splitlines()[:6]) + "\n"
     world, _ = load_parts(load_scenario(target / "minimal.yaml"))
     assert [(model.name, model.links[0].pose.position) for model in world.models] == [

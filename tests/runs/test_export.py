@@ -49,7 +49,9 @@ def run_of(tmp_path, models, keep=None, protected=(), reading=PLAIN, robot=None)
     scenario = with_options(scenario_for_world(world, (0, 0, 0.2, 0), (6, 0)), reading=reading)
     scenario = scenario.model_copy(update={"protected": tuple(protected)})
     if robot is not None:
-        scenario = scenario.model_copy(update={"robot": scenario.robot.model_copy(update={"model": robot})})
+        scenario = scenario.model_copy(
+            update={"robot": scenario.robot.model_copy(update={"model": robot})}
+        )
     run = tmp_path / "run.ddenv"
     create_run(scenario, run)
     if keep is not None:
@@ -64,8 +66,13 @@ def _reduce(run, keep):
         names = file.events()[0].event.elements
         keep, everything = [names.index(name) for name in keep], list(range(len(names)))
         parts = [keep, [number for number in everything if number not in keep]]
-        writing, split = Writing(file), {"partitions": parts, "candidates": [["partition", 0, None]]}
-        writing.write("round_started", {"round": 1, "n_partitions": 2, "environment": everything} | split)
+        writing, split = (
+            Writing(file),
+            {"partitions": parts, "candidates": [["partition", 0, None]]},
+        )
+        writing.write(
+            "round_started", {"round": 1, "n_partitions": 2, "environment": everything} | split
+        )
         writing.write("reduced", {"candidate": 0, "environment": keep, "evidence_test": 1})
 
 
@@ -80,7 +87,11 @@ def test_files_beside_the_scenario_or_below_are_named_relative_to_it(tmp_path, f
     (folder / "models").mkdir()
     away = tmp_path / "away"
     away.mkdir()
-    run = run_of(tmp_path, [box("a", 5), box("b", 7)], reading=reading_of(model_path=[folder / "models", away]))
+    run = run_of(
+        tmp_path,
+        [box("a", 5), box("b", 7)],
+        reading=reading_of(model_path=[folder / "models", away]),
+    )
     told = exported(run, folder, "worlds/m.sdf")
     assert told["world"] == "worlds/m.sdf"
     assert told["robot"]["model"] == "m.robot.sdf"
@@ -94,7 +105,9 @@ def test_a_world_elsewhere_is_named_by_its_whole_path(tmp_path, folder, monkeypa
     run = run_of(tmp_path, [box("a", 5)])
     monkeypatch.chdir(folder)
     (tmp_path / "other").mkdir()
-    assert exported(run, folder, tmp_path / "other" / "m.sdf")["world"] == str(tmp_path / "other" / "m.sdf")
+    assert exported(run, folder, tmp_path / "other" / "m.sdf")["world"] == str(
+        tmp_path / "other" / "m.sdf"
+    )
 
 
 @pytest.mark.parametrize(
@@ -148,10 +161,17 @@ def test_a_urdf_stays_one_and_its_package_is_found(tmp_path, folder):
     robot.parent.mkdir()
     text = (ROOT / "docs" / "examples" / "own_robot" / "cart.urdf").read_text()
     uri = "package://cart/meshes/body.obj"
-    robot.write_text(text.replace('<box size="0.36 0.26 0.10"/>', f'<mesh filename="{uri}" scale="0.1 0.1 0.1"/>'))
+    robot.write_text(
+        text.replace(
+            '<box size="0.36 0.26 0.10"/>', f'<mesh filename="{uri}" scale="0.1 0.1 0.1"/>'
+        )
+    )
     run = run_of(tmp_path, [box("a", 5)], robot=robot)
     told = exported(run, folder)
-    assert (told["robot"]["model"], told["reading"]["model_path"]) == ("m.robot.urdf", [str(robot.parents[1])])
+    assert (told["robot"]["model"], told["reading"]["model_path"]) == (
+        "m.robot.urdf",
+        [str(robot.parents[1])],
+    )
     load_parts(load_scenario(folder / "m.yaml"))
 
 
@@ -170,7 +190,9 @@ def test_what_the_kept_models_name_is_still_needed(tmp_path, folder):
         (rocks / f"{name}.obj").write_text(TETRAHEDRON)
     uris = [f"model://rocks/{name}.obj" for name in "abc"]
     models = [mesh(uri[-5], uri, 5 + 3 * number) for number, uri in enumerate(uris)]
-    run = run_of(tmp_path, models, keep=["a", "c"], reading=reading_of(model_path=[tmp_path / "models"]))
+    run = run_of(
+        tmp_path, models, keep=["a", "c"], reading=reading_of(model_path=[tmp_path / "models"])
+    )
     assert export_world(run, folder / "m.sdf", None).needs == [uris[0], uris[2]]
 
 
@@ -179,7 +201,11 @@ def test_protected_models_are_called_as_they_are_in_the_exported_world(tmp_path,
     run = run_of(tmp_path, models, keep=["crate"], protected=["box #3", "post"])
     assert exported(run, folder)["protected"] == ["box", "post"]
     world, _ = load_parts(load_scenario(folder / "m.yaml"))
-    assert {model.name: model.pose.position[0] for model in world.models} == {"post": 11, "box": 14, "crate": 17}
+    assert {model.name: model.pose.position[0] for model in world.models} == {
+        "post": 11,
+        "box": 14,
+        "crate": 17,
+    }
 
 
 GROUND = (
@@ -203,14 +229,22 @@ def ball(name, x):
 
 # The models, and those of them that are left.
 PARTS = {
-    "a far one is gone": ([GROUND, box("post", 2).replace("2 5", "2 0.6"), box("far", 300)], ["post"]),
+    "a far one is gone": (
+        [GROUND, box("post", 2).replace("2 5", "2 0.6"), box("far", 300)],
+        ["post"],
+    ),
     "a low one is gone": ([TABLE, box("low", 0).replace("5 0", "0 -9")], ["table"]),
-    "another one that moves is gone": ([GROUND, SLOPE, ball("ball", -2), ball("other", 30)], ["slope", "ball"]),
+    "another one that moves is gone": (
+        [GROUND, SLOPE, ball("ball", -2), ball("other", 30)],
+        ["slope", "ball"],
+    ),
 }
 
 
 @pytest.mark.parametrize("parts", slow(pytest.mark.rates, PARTS, but=["a far one is gone"]))
-def test_the_robot_does_the_same_in_what_was_written_as_in_the_reduction(tmp_path, folder, monkeypatch, parts):
+def test_the_robot_does_the_same_in_what_was_written_as_in_the_reduction(
+    tmp_path, folder, monkeypatch, parts
+):
     models, keep = PARTS[parts]
     # How a ball rolls is found out for so long, shared by all of them.
     monkeypatch.setattr(rehearsal, "BUDGET", 5.0)
@@ -231,12 +265,24 @@ def test_the_robot_does_the_same_in_what_was_written_as_in_the_reduction(tmp_pat
 def test_the_command_line_says_what_is_still_needed(tmp_path, folder):
     for name in "abcde":
         (tmp_path / f"{name}.obj").write_text(TETRAHEDRON)
-    models = [mesh(name, tmp_path / f"{name}.obj", 5 + 3 * number) for number, name in enumerate("abcde")]
-    words = [sys.executable, "-m", "ddenv", "export", run_of(tmp_path, models), "--sdf", folder / "m.sdf"]
+    models = [
+        mesh(name, tmp_path / f"{name}.obj", 5 + 3 * number) for number, name in enumerate("abcde")
+    ]
+    words = [
+        sys.executable,
+        "-m",
+        "ddenv",
+        "export",
+        run_of(tmp_path, models),
+        "--sdf",
+        folder / "m.sdf",
+    ]
     done = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE)
     assert done.stdout == f"wrote {folder / 'm.sdf'}\n"
     # It was stopped before its baseline was done.
     needs, known = done.stderr.splitlines()
-    assert known == "no failure is known yet: this is the whole world; 'ddenv resume RUN' reduces it"
+    assert (
+        known == "no failure is known yet: this is the whole world; 'ddenv resume RUN' reduces it"
+    )
     assert needs.startswith(f"{folder / 'm.sdf'} still needs ")
     assert needs.endswith("c.obj and 2 more")

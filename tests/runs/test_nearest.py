@@ -79,7 +79,12 @@ ENDS = {
         False,
         "; not shown that each of them has to go: undecided with crate_01 put back",
     ),
-    "the worst": ((PASSES, *EACH_NEEDED), 1, True, "with any one of these 3 put back in at most 0 of 9 fresh runs"),
+    "the worst": (
+        (PASSES, *EACH_NEEDED),
+        1,
+        True,
+        "with any one of these 3 put back in at most 0 of 9 fresh runs",
+    ),
     "no world": ((), None, False, "no passing world was found: the robot does not reach its goal"),
     "no world of all": ((), None, False, "all 11 models that may be removed"),
 }

@@ -6,7 +6,14 @@ from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.export import export_world
-from ddenv.runs.subject import load_parts, read_parts, reading_of, scenario_for_world, scenario_named, with_options
+from ddenv.runs.subject import (
+    load_parts,
+    read_parts,
+    reading_of,
+    scenario_for_world,
+    scenario_named,
+    with_options,
+)
 from ddenv.world.load import load_scenario
 from ddenv.world.model import Cylinder, Mesh
 from tests.runs.test_export import TETRAHEDRON
@@ -29,14 +36,20 @@ def world(tmp_path):
     (folder / "rock.obj").write_text(TETRAHEDRON)
     (folder / "model.sdf").write_text(ROCK)
     rock = "<include><uri>model://rock</uri><pose>5 5 0 0 0 0</pose></include>"
-    barrel = "<include><uri>model://barrel</uri><name>barrel</name><pose>3 0 0 0 0 0</pose></include>"
+    barrel = (
+        "<include><uri>model://barrel</uri><name>barrel</name><pose>3 0 0 0 0 0</pose></include>"
+    )
     path = tmp_path / "world.sdf"
-    path.write_text(f"<sdf version='1.9'>\n<world name='w'>\n{GROUND}\n{rock}\n{barrel}\n</world></sdf>")
+    path.write_text(
+        f"<sdf version='1.9'>\n<world name='w'>\n{GROUND}\n{rock}\n{barrel}\n</world></sdf>"
+    )
     return path
 
 
 def scenario_of(world, **reading):
-    chosen = reading_of(model_path=[world.parent / "models"], stand_in=["model://barrel=cylinder:0.3,1"], **reading)
+    chosen = reading_of(
+        model_path=[world.parent / "models"], stand_in=["model://barrel=cylinder:0.3,1"], **reading
+    )
     return with_options(scenario_for_world(world, (0, 0, 0.14, 0), (6, 0)), reading=chosen)
 
 
@@ -66,7 +79,9 @@ def test_folders_and_stand_ins_of_a_scenario_come_after_those_of_the_command_lin
     scenario = scenario_of(world)
     other = tmp_path / "other"
     other.mkdir()
-    more = reading_of(scenario.reading, model_path=[other], stand_in=["model://barrel=sphere:1"], ignore=["mesh"])
+    more = reading_of(
+        scenario.reading, model_path=[other], stand_in=["model://barrel=sphere:1"], ignore=["mesh"]
+    )
     assert more.model_path == (other, tmp_path / "models")
     assert more.stand_ins == {"model://barrel": "sphere:1"}
     assert more.ignore == ("mesh",)
@@ -79,9 +94,18 @@ def test_folders_and_stand_ins_of_a_scenario_come_after_those_of_the_command_lin
 WRONG = {
     "no folder": ({"model_path": ["nowhere"]}, "--model-path: there is no folder nowhere"),
     "no shape": ({"stand_in": ["model://x"]}, "--stand-in: expected URI=SHAPE"),
-    "unknown shape": ({"stand_in": ["model://x=cone:1,2"]}, "'cone:1,2' is not a stand-in; use box:x,y,z"),
-    "too few sizes": ({"stand_in": ["model://x=cylinder:1"]}, "expected radius,length in m, found '1'"),
-    "a shape for everything": ({"stand_in": ["*=sphere:1"]}, "only auto can stand for all that is missing"),
+    "unknown shape": (
+        {"stand_in": ["model://x=cone:1,2"]},
+        "'cone:1,2' is not a stand-in; use box:x,y,z",
+    ),
+    "too few sizes": (
+        {"stand_in": ["model://x=cylinder:1"]},
+        "expected radius,length in m, found '1'",
+    ),
+    "a shape for everything": (
+        {"stand_in": ["*=sphere:1"]},
+        "only auto can stand for all that is missing",
+    ),
     "no size": ({"stand_in": ["model://x=sphere:0"]}, "sizes must be positive"),
     "not finite": ({"stand_in": ["model://x=sphere:nan"]}, "expected radius in m"),
     "no centre": ({"stand_in": ["model://x=sphere:1@2"]}, "expected x,y,z in m, found '2'"),
@@ -100,7 +124,9 @@ def test_wrong_options_get_one_line(options, words):
 def test_a_wrong_stand_in_in_a_scenario_is_told_with_its_uri(world, tmp_path):
     scenario = scenario_of(world)
     reading = scenario.reading.model_copy(update={"stand_ins": {"model://barrel": "tube:1"}})
-    with pytest.raises(UserError, match="stand-in for 'model://barrel': 'tube:1' is not a stand-in"):
+    with pytest.raises(
+        UserError, match="stand-in for 'model://barrel': 'tube:1' is not a stand-in"
+    ):
         create_run(with_options(scenario, reading=reading), tmp_path / "run.ddenv")
 
 
@@ -115,7 +141,9 @@ def test_a_guess_is_left_out_where_the_robot_starts(tmp_path):
     scenario = scenario_named(str(path), given, said.append)
     world, _ = load_parts(scenario)
     assert [model.name for model in world.models] == ["ground", "crate"]
-    assert said == ["the robot would start inside a guess, so this is left out: model://hall, model://wagon"]
+    assert said == [
+        "the robot would start inside a guess, so this is left out: model://hall, model://wagon"
+    ]
     run = tmp_path / "run.ddenv"
     create_run(scenario, run)
     with RunFile(run) as file:

@@ -30,7 +30,9 @@ def put(run, test, model, samples):
 
 
 def way(*rows):
-    return array("d", [value for time, x in rows for value in (time, x, 0, 0, 1, 0, 0, 0)]).tobytes()
+    return array(
+        "d", [value for time, x in rows for value in (time, x, 0, 0, 1, 0, 0, 0)]
+    ).tobytes()
 
 
 def test_the_robot_and_the_models_that_moved_are_where_they_were(finished):
@@ -92,7 +94,8 @@ def test_of_another_simulator_only_the_robot_moves_and_it_says_so(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("number", "what"), [(0, "test 0"), (-1, "run 1 with a changed number"), (10**9, "test 1000000000")]
+    ("number", "what"),
+    [(0, "test 0"), (-1, "run 1 with a changed number"), (10**9, "test 1000000000")],
 )
 def test_there_is_no_such_test(finished, number, what):
     with pytest.raises(UserError, match=f"there is no {what}"):

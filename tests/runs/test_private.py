@@ -33,7 +33,8 @@ def test_all_files_of_a_run_are_for_whom_the_run_is(tmp_path, started, mode, bes
             programs.start_engine(path, 1)
             programs.start_scene(path)
             files = {
-                each.name.removeprefix(path.name): stat.S_IMODE(each.stat().st_mode) for each in tmp_path.iterdir()
+                each.name.removeprefix(path.name): stat.S_IMODE(each.stat().st_mode)
+                for each in tmp_path.iterdir()
             }
         assert files == dict.fromkeys(("", "-wal", "-shm", ".lock", ".log", ".scene.log"), beside)
     finally:

@@ -39,11 +39,21 @@ def test_without_limits_all_cores_of_the_affinity(usable, monkeypatch, tmp_path)
 
 @pytest.mark.parametrize(
     ("text", "cores"),
-    [("max 100000", 64), ("200000 100000", 2), ("150000 100000", 2), ("5000 100000", 1), ("", 64), ("what 0", 64)],
+    [
+        ("max 100000", 64),
+        ("200000 100000", 2),
+        ("150000 100000", 2),
+        ("5000 100000", 1),
+        ("", 64),
+        ("what 0", 64),
+    ],
 )
 def test_the_lowest_limit_of_all_groups_around_counts(usable, text, cores):
     assert usable("0::/", {"sys/fs/cgroup/cpu.max": text}) == cores
-    inner = {"sys/fs/cgroup/a/cpu.max": "300000 100000", "sys/fs/cgroup/a/b/c/cpu.max": "max 100000"}
+    inner = {
+        "sys/fs/cgroup/a/cpu.max": "300000 100000",
+        "sys/fs/cgroup/a/b/c/cpu.max": "max 100000",
+    }
     assert usable("0::/a/b/c", inner) == min(3, cores)
 
 
@@ -67,11 +77,22 @@ MEMORY = "MemTotal:  16000 kB\nMemFree:  1 kB\nMemAvailable:   9000 kB\nHugePage
     ("group", "limits", "found"),
     [
         ("0::/", {}, (16000, 9000)),
-        ("0::/a/b", {"a/memory.max": "4096000", "a/memory.current": "1024000", "a/b/memory.max": "max"}, (4000, 3000)),
+        (
+            "0::/a/b",
+            {"a/memory.max": "4096000", "a/memory.current": "1024000", "a/b/memory.max": "max"},
+            (4000, 3000),
+        ),
         ("0::/", {"memory.max": "99999999999", "memory.current": "1"}, (16000, 9000)),
-        (VERSION_1, {"memory/memory.limit_in_bytes": "2048000", "memory/memory.usage_in_bytes": "4096000"}, (2000, 0)),
+        (
+            VERSION_1,
+            {"memory/memory.limit_in_bytes": "2048000", "memory/memory.usage_in_bytes": "4096000"},
+            (2000, 0),
+        ),
     ],
 )
 def test_the_memory_is_that_of_the_smallest_group(usable, tmp_path, group, limits, found):
-    usable(group, {"proc/meminfo": MEMORY} | {f"sys/fs/cgroup/{name}": text for name, text in limits.items()})
+    usable(
+        group,
+        {"proc/meminfo": MEMORY} | {f"sys/fs/cgroup/{name}": text for name, text in limits.items()},
+    )
     assert (processor.usable_memory(), processor.free_memory()) == tuple(1024 * kb for kb in found)

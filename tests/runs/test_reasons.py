@@ -9,7 +9,17 @@ from ddenv.errors import UserError
 from ddenv.evidence.certificate import Pairs
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.runs.reasons import APART, GOAL, End, F, Parting, parted, parting_sentence, reasons, sentence
+from ddenv.runs.reasons import (
+    APART,
+    GOAL,
+    End,
+    F,
+    Parting,
+    parted,
+    parting_sentence,
+    reasons,
+    sentence,
+)
 from ddenv.text import percent_at_least, percent_at_most
 from tests.conftest import ROOT
 from tests.workbench import fake_moments
@@ -24,7 +34,9 @@ def found(run):
 
 
 @pytest.mark.parametrize("lesson", [None, "ditch", "quay-kept", "ditch-sliced"])
-def test_there_is_a_reason_for_each_model_that_was_left_out_with_the_numbers_of_its_runs(found, lesson):
+def test_there_is_a_reason_for_each_model_that_was_left_out_with_the_numbers_of_its_runs(
+    found, lesson
+):
     state, each = found
     if lesson is not None:
         with RunFile(LESSONS / f"{lesson}.ddenv") as file:
@@ -55,7 +67,9 @@ def test_runs_that_end_far_from_each_other_are_not_said_to_end_near_one_place(fo
 def test_the_runs_that_are_compared_have_one_seed_and_other_ends(found):
     state, each = found
     for one in each:
-        mine, other = (state.tests[test - 1] for test in (one.parting.with_test, one.parting.without_test))
+        mine, other = (
+            state.tests[test - 1] for test in (one.parting.with_test, one.parting.without_test)
+        )
         assert mine.seed == other.seed == one.parting.seed
         assert (mine.outcome, mine.without) == ("similar", None)
         assert (other.outcome, other.without) == ("pass", one.without)
@@ -74,7 +88,14 @@ def test_runs_are_compared_also_where_f_is_what_happens_most(run):
 
 def test_trajectories_part_where_they_first_differ_by_more_than_a_tenth_of_a_metre():
     def way(*ys):
-        return array("d", [value for number, y in enumerate(ys) for value in (0.1 * number, number, y, 0, 1, 0, 0, 0)])
+        return array(
+            "d",
+            [
+                value
+                for number, y in enumerate(ys)
+                for value in (0.1 * number, number, y, 0, 1, 0, 0, 0)
+            ],
+        )
 
     same = way(0, 0, 0, 0)
     assert parted(same, same) == (pytest.approx(0.3), None, None)
@@ -86,7 +107,16 @@ def test_trajectories_part_where_they_first_differ_by_more_than_a_tenth_of_a_met
 
 def test_it_says_when_the_robot_met_the_model_and_nothing_where_no_pair_shows_it(found):
     one = found[1][0]
-    met = Parting(with_test=1, without_test=2, seed=7, equal=1.2, apart=2.0, place=(-0.001, 3.0), met=1.1, touched=True)
+    met = Parting(
+        with_test=1,
+        without_test=2,
+        seed=7,
+        equal=1.2,
+        apart=2.0,
+        place=(-0.001, 3.0),
+        met=1.1,
+        touched=True,
+    )
     assert parting_sentence(replace(one, parting=met)) == (
         "With seed 7 the two runs differ after 1.2 s, and are 0.1 m apart after 2.0 s, at (0.00, 3.00) m. "
         "With it there, the robot touches it after 1.1 s."
@@ -96,7 +126,9 @@ def test_it_says_when_the_robot_met_the_model_and_nothing_where_no_pair_shows_it
 
 def test_without_a_certificate_it_says_how_to_make_one(run):
     fake_moments.uncertified(run)
-    with pytest.raises(UserError, match="no fresh runs were made; make a certificate first: ddenv certify"):
+    with pytest.raises(
+        UserError, match="no fresh runs were made; make a certificate first: ddenv certify"
+    ):
         reasons(run.file, run.state)
 
 

@@ -13,7 +13,11 @@ from ddenv.runs.subject import open_subject, robot_file, scenario_named
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from tests.conftest import DATA
 
-NOTHING = dict.fromkeys(("spawn", "goal", "world")) | {"model_path": (), "stand_in": (), "ignore": ()}
+NOTHING = dict.fromkeys(("spawn", "goal", "world")) | {
+    "model_path": (),
+    "stand_in": (),
+    "ignore": (),
+}
 
 
 @pytest.fixture
@@ -71,7 +75,8 @@ def test_the_robot_of_a_run_needs_no_file_of_its_own(here):
     own = here / "robot.sdf"
     shutil.copy(scenario.robot.model, own)
     create_run(
-        scenario.model_copy(update={"robot": scenario.robot.model_copy(update={"model": own})}), here / "a.ddenv"
+        scenario.model_copy(update={"robot": scenario.robot.model_copy(update={"model": own})}),
+        here / "a.ddenv",
     )
     subject, text = open_subject("a.ddenv", NOTHING), own.read_bytes()
     with robot_file(subject) as file:
@@ -87,6 +92,8 @@ def test_a_path_that_is_not_utf_8_is_refused_in_one_line(tmp_path, name):
     folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"))
     folder.mkdir()
     for file in (SDF / "worlds" / "friction.sdf", SCENARIOS / "friction.yaml"):
-        (folder / f"{'world' if file.suffix == '.sdf' else 'scenario'}{file.suffix}").write_bytes(file.read_bytes())
+        (folder / f"{'world' if file.suffix == '.sdf' else 'scenario'}{file.suffix}").write_bytes(
+            file.read_bytes()
+        )
     with pytest.raises(UserError, match="this path is not UTF-8 text"):
         scenario_named(str(folder / name), NOTHING | {"spawn": (0.0, 0.0, 0.2), "goal": (9.0, 0.0)})

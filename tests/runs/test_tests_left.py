@@ -62,7 +62,12 @@ def certified(rate, certify_rate, left, at_least, random):
         (name,) = subject
         return shown.setdefault((name, number), random.random() < rates.get(name, 0.0))
 
-    terms = Terms(certify_rate=certify_rate, keep_rate=max(certify_rate, 0.8), error=error_of(1), at_least=at_least)
+    terms = Terms(
+        certify_rate=certify_rate,
+        keep_rate=max(certify_rate, 0.8),
+        error=error_of(1),
+        at_least=at_least,
+    )
     kept = settle(keeps(frozenset([end]), frozenset([whole]), terms), show).verdict == "kept"
     for model in range(left if kept else 0):
         settle(falls(frozenset([str(model)]), frozenset([end]), terms.error_of_models(1.0)), show)
@@ -99,7 +104,9 @@ def test_a_rate_that_few_runs_showed_may_be_another_one(runs):
 
 
 def test_a_rough_run_has_its_certificate():
-    asked = load_scenario(DATA / "wall.yaml").reduction.model_copy(update={"baseline_runs": 10, "certify_rate": 0.8})
+    asked = load_scenario(DATA / "wall.yaml").reduction.model_copy(
+        update={"baseline_runs": 10, "certify_rate": 0.8}
+    )
     kept, printed = rough_run(43, asked), rough_run(43, asked.model_copy(update=PRINTED))
     assert kept.certificate == printed.certificate == certificate_tests(10.5 / 11, 0.8, 3, 10)
     assert kept.tests[1] == 10 + kept.search[1] + kept.certificate[1]
@@ -131,7 +138,9 @@ CERTIFICATE = certificate_tests(3.5 / 5, 2 / 3, 3, 4, 4)
 
 def test_the_certificate_is_left_after_the_search(run):
     state = fake_moments.mid_round(run).state
-    search = (max(0, each - state.tests_done + state.forecast.tests_done) for each in state.forecast.tests)
+    search = (
+        max(0, each - state.tests_done + state.forecast.tests_done) for each in state.forecast.tests
+    )
     assert left(run).tests == tuple(a + b for a, b in zip(search, CERTIFICATE, strict=True))
 
 
@@ -151,7 +160,9 @@ def test_a_certificate_takes_the_tests_that_it_has_not_made(run):
     for made in range(1, high):
         make(10_000 + made)
         if made == likely:
-            assert left(run).tests == (2, likely // LATE, high - likely), "it is late, so it is not about to end"
+            assert left(run).tests == (2, likely // LATE, high - likely), (
+                "it is late, so it is not about to end"
+            )
     # Those that run are left in any case.
     assert left(run).tests == (2, 2, 2)
     make(10_000 + high)
@@ -227,5 +238,7 @@ def test_once_removals_have_shown_something_the_rest_is_forecast_from_that(left,
         took.append(max(20, len(claim.rests_on)))
         low.append(forecast[0])
         high.append(forecast[2])
-    inside = sum(least <= number <= most for least, number, most in zip(low, took, high, strict=True))
+    inside = sum(
+        least <= number <= most for least, number, most in zip(low, took, high, strict=True)
+    )
     assert inside >= 22

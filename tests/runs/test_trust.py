@@ -51,7 +51,10 @@ def scenario(home):
 @pytest.mark.parametrize("brings", BRINGS.values(), ids=BRINGS)
 def test_what_is_brought_along_is_trusted_as_it_is(scenario, brings):
     loaded = load_scenario(scenario(brings))
-    with pytest.raises(UserError, match=r"mail\.ddenv: would start the (command|controller|simulator) .* give --trust"):
+    with pytest.raises(
+        UserError,
+        match=r"mail\.ddenv: would start the (command|controller|simulator) .* give --trust",
+    ):
         check_trusted(loaded, "mail.ddenv")
     trust(program_of(loaded))
     check_trusted(loaded, "mail.ddenv")
@@ -115,7 +118,9 @@ def test_a_file_of_the_users_own_is_trusted_and_one_that_others_can_write_is_not
 
 
 def test_a_scenario_that_ddenv_wrote_of_a_run_is_asked_about(scenario, home):
-    run, written, saved = (home / "own" / name for name in ("mail.ddenv", "minimal.yaml", "saved.yaml"))
+    run, written, saved = (
+        home / "own" / name for name in ("mail.ddenv", "minimal.yaml", "saved.yaml")
+    )
     loaded = load_scenario(scenario(BRINGS["command"]))
     create_run(loaded, run)
     with RunFile(run) as file:

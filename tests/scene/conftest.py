@@ -72,13 +72,24 @@ class Writer:
         self._writing.write(kind, data, motions)
 
     def start_test(self, test: int, *, candidate: int | None = None, run: int = 0) -> None:
-        place = {"phase": "baseline", "round": None} if candidate is None else {"phase": "round", "round": 1}
-        self.append("test_started", place | {"test": test, "candidate": candidate, "run": run, "seed": run})
+        place = (
+            {"phase": "baseline", "round": None}
+            if candidate is None
+            else {"phase": "round", "round": 1}
+        )
+        self.append(
+            "test_started", place | {"test": test, "candidate": candidate, "run": run, "seed": run}
+        )
 
     def finish_test(self, test: int, outcome: str, end: float = 3.0) -> None:
         rows, board = straight(end), straight(0.5)
         noticed = {"first_sensed": [], "first_touched": [], "cut": False}
-        values = {"failure": "out of time", "distance": None, "end_pose": [*rows[-1, 1:]], **noticed}
+        values = {
+            "failure": "out of time",
+            "distance": None,
+            "end_pose": [*rows[-1, 1:]],
+            **noticed,
+        }
         seconds = {"simulated_seconds": 8.0, "wall_seconds": 0.1}
         motions = {"": rows.tobytes(), "board": board.tobytes()}
         self.append("test_finished", {"test": test, "outcome": outcome} | values | seconds, motions)
@@ -90,7 +101,14 @@ class Writer:
         self.start_engine()
         self.start_test(1)
         self.finish_test(1, "failed")
-        numbers = {"runs": 1, "failures": 1, "rate": 1.0, "low": 0.2, "high": 1.0, "miss_chance": 0.0}
+        numbers = {
+            "runs": 1,
+            "failures": 1,
+            "rate": 1.0,
+            "low": 0.2,
+            "high": 1.0,
+            "miss_chance": 0.0,
+        }
         place = {"failure_test": 1, "position": [3.0, 0.0, 0.132], "iterations_95": 0}
         known = {"outcomes": {"1": "similar"}, "distances": {"1": 0.0}}
         self.append("baseline_finished", numbers | place | known)
@@ -98,13 +116,17 @@ class Writer:
     def round(self) -> None:
         candidates = [["partition", 0, 1.0], ["partition", 1, 2.0]]
         parts = {"partitions": [[0, 1], [2, 3]], "candidates": candidates}
-        self.append("round_started", {"round": 1, "n_partitions": 2, "environment": [0, 1, 2, 3]} | parts)
+        self.append(
+            "round_started", {"round": 1, "n_partitions": 2, "environment": [0, 1, 2, 3]} | parts
+        )
 
     def reduce(self) -> None:
         """Candidate 0 shows the failure in test 2, and is taken."""
         self.start_test(2, candidate=0)
         self.finish_test(2, "similar", end=3.1)
-        self.append("candidate_judged", {"candidate": 0, "verdict": "similar", "tests": [2], "known": 0})
+        self.append(
+            "candidate_judged", {"candidate": 0, "verdict": "similar", "tests": [2], "known": 0}
+        )
         self.append("reduced", {"candidate": 0, "environment": [0, 1], "evidence_test": 2})
         self.append("round_finished", {})
 

@@ -25,13 +25,26 @@ from ddenv.report.report import write_report
 from tests.waiting import PATIENCE, eventually, wait_until
 
 CHROMIUM = shutil.which("chromium")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine: the picture cannot be looked at")
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None, reason="no chromium on this machine: the picture cannot be looked at"
+)
 
 ROBOT_YELLOW = (240, 190, 20)
 _FLAGS = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader"),
-    *("--enable-unsafe-swiftshader", "--no-first-run", "--disable-background-networking", "--disable-component-update"),
-    *("--disable-sync", "--disable-quic", "--disable-dev-shm-usage", "--hide-scrollbars", "--remote-debugging-port=0"),
+    *(
+        "--enable-unsafe-swiftshader",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--disable-component-update",
+    ),
+    *(
+        "--disable-sync",
+        "--disable-quic",
+        "--disable-dev-shm-usage",
+        "--hide-scrollbars",
+        "--remote-debugging-port=0",
+    ),
 )
 
 
@@ -39,7 +52,13 @@ _FLAGS = (
 def chromium(size: tuple[int, int]):
     """A browser with an empty profile; gives the port of its protocol."""
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        words = [CHROMIUM, *_FLAGS, f"--user-data-dir={profile}", f"--window-size={size[0]},{size[1]}", "about:blank"]
+        words = [
+            CHROMIUM,
+            *_FLAGS,
+            f"--user-data-dir={profile}",
+            f"--window-size={size[0]},{size[1]}",
+            "about:blank",
+        ]
         process = subprocess.Popen(
             words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
@@ -55,7 +74,9 @@ def chromium(size: tuple[int, int]):
 
 
 def _protocol_port(file: Path) -> int:
-    wait_until(lambda: file.exists() and file.read_text().splitlines(), lambda: "chromium did not start")
+    wait_until(
+        lambda: file.exists() and file.read_text().splitlines(), lambda: "chromium did not start"
+    )
     return int(file.read_text().splitlines()[0])
 
 
@@ -75,7 +96,9 @@ class Page:
 
     async def do(self, method: str, **parameters):
         self._count += 1
-        await self._connection.write_message(json.dumps({"id": self._count, "method": method, "params": parameters}))
+        await self._connection.write_message(
+            json.dumps({"id": self._count, "method": method, "params": parameters})
+        )
         while True:
             message = await self._connection.read_message()
             if message is None:
@@ -95,7 +118,9 @@ class Page:
 
     async def value(self, expression: str):
         """What a JavaScript expression gives, promises awaited."""
-        result = await self.do("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
+        result = await self.do(
+            "Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True
+        )
         return result["result"].get("value")
 
     async def screenshot(self) -> bytes:
@@ -139,10 +164,19 @@ async def test_the_picture_shows_robot_goal_and_failure(reduced, start_scene):
         ready = "typeof viewer !== 'undefined' && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 5"
         await shows(page, ready)
         await shows(page, "document.title === 'small · ddenv'")
-        await shows(page, "document.querySelector('#caption .models').textContent === '2 of 4 models'")
-        await shows(page, "viewer.scene_tree.find(['world', 'models', '003 board']).object.visible === false")
-        await shows(page, "viewer.scene_tree.find(['world', 'removed', 'all']).object.visible === true")
-        await page.value("document.querySelectorAll('.card').forEach((card) => card.style.opacity = 0)")
+        await shows(
+            page, "document.querySelector('#caption .models').textContent === '2 of 4 models'"
+        )
+        await shows(
+            page,
+            "viewer.scene_tree.find(['world', 'models', '003 board']).object.visible === false",
+        )
+        await shows(
+            page, "viewer.scene_tree.find(['world', 'removed', 'all']).object.visible === true"
+        )
+        await page.value(
+            "document.querySelectorAll('.card').forEach((card) => card.style.opacity = 0)"
+        )
         assert await page.value("forbidden") == []
 
         pictures = []
@@ -188,14 +222,25 @@ async def test_a_finished_test_is_played_with_a_slider_steps_and_a_ghost(reduced
         slide = "(at) => { const one = document.getElementById('time'); one.value = at; one.dispatchEvent(new Event('input')); }"
         await page.value(f"({slide})(4)")
         assert await page.value(place_of("'robot'")) == pytest.approx(1.55, abs=0.01)
-        assert await page.value(place_of("'models', '003 board'")) == pytest.approx(0.25 - 1, abs=0.01)
+        assert await page.value(place_of("'models', '003 board'")) == pytest.approx(
+            0.25 - 1, abs=0.01
+        )
         # The edges of its partition go with it.
-        await page.value("said = { ...said, parts: [['B', '#f0a028', 1, -1.5, 0.25, '003 board']] }")
-        await shows(page, place_of("'parts', '003 board'") + " === " + place_of("'models', '003 board'"))
+        await page.value(
+            "said = { ...said, parts: [['B', '#f0a028', 1, -1.5, 0.25, '003 board']] }"
+        )
+        await shows(
+            page, place_of("'parts', '003 board'") + " === " + place_of("'models', '003 board'")
+        )
         await page.value("document.getElementById('on').click()")
         assert await page.value("document.getElementById('clock').value") == "4.1 s of 8.0 s"
-        await page.value("document.dispatchEvent(new KeyboardEvent('keydown', {key: ',', bubbles: true}))")
-        assert await page.value("document.getElementById('time').getAttribute('aria-valuetext')") == "4.0 s of 8.0 s"
+        await page.value(
+            "document.dispatchEvent(new KeyboardEvent('keydown', {key: ',', bubbles: true}))"
+        )
+        assert (
+            await page.value("document.getElementById('time').getAttribute('aria-valuetext')")
+            == "4.0 s of 8.0 s"
+        )
         # Two runs at once, and where they part.
         await page.value("chosen = true; load(2, {ghost: 1, equal: 0, apart: 2.5})")
         await shows(page, "ghost !== null && time === 0")
@@ -210,16 +255,20 @@ async def test_a_finished_test_is_played_with_a_slider_steps_and_a_ghost(reduced
         assert await page.value("node('removed').visible") is False
         # A test that is not there is told in words.
         await page.value("load(77)")
-        await shows(page, "document.getElementById('trouble').textContent.includes('test 77 has not ended')")
+        await shows(
+            page, "document.getElementById('trouble').textContent.includes('test 77 has not ended')"
+        )
         # Its wheels turn as far as its way makes them roll, and the ghost's as far as its own.
         wheel = "Math.abs(viewer.scene_tree.find(['world', '{}', 'wheel 0']).object.quaternion.y)"
-        assert await page.value(wheel.format("robot")) == pytest.approx(abs(math.sin(robot / 0.1651 / 2)), abs=0.01)
-        assert await page.value(wheel.format("ghost")) == pytest.approx(abs(math.sin(ghost / 0.1651 / 2)), abs=0.01)
+        assert await page.value(wheel.format("robot")) == pytest.approx(
+            abs(math.sin(robot / 0.1651 / 2)), abs=0.01
+        )
+        assert await page.value(wheel.format("ghost")) == pytest.approx(
+            abs(math.sin(ghost / 0.1651 / 2)), abs=0.01
+        )
         assert await page.value("forbidden") == []
         unnamed = "[...document.querySelectorAll('#play button, #play input, #play select')]"
-        unnamed += (
-            ".filter((one) => !one.textContent.trim() && !one.getAttribute('aria-label') && !one.labels?.length).length"
-        )
+        unnamed += ".filter((one) => !one.textContent.trim() && !one.getAttribute('aria-label') && !one.labels?.length).length"
         assert await page.value(unnamed) == 0
 
 

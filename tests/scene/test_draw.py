@@ -40,7 +40,9 @@ class Screen:
 
     def take(self, message: bytes, _: bool = False) -> None:
         self.count += 1
-        command = umsgpack.unpackb(message, ext_handlers={code: lambda ext: ext for code in range(0x11, 0x19)})
+        command = umsgpack.unpackb(
+            message, ext_handlers={code: lambda ext: ext for code in range(0x11, 0x19)}
+        )
         kind, path = command["type"], command["path"]
         if kind == "set_object":
             self.things[path] = command["object"]
@@ -54,7 +56,11 @@ class Screen:
             self.visible[path] = command["value"]
 
     def shown(self, folder: str) -> set[str]:
-        return {path.rsplit("/", 1)[-1] for path, on in self.visible.items() if on and f"/{folder}/" in path}
+        return {
+            path.rsplit("/", 1)[-1]
+            for path, on in self.visible.items()
+            if on and f"/{folder}/" in path
+        }
 
 
 @pytest.fixture
@@ -88,9 +94,17 @@ def player(writer, stage, words) -> Player:
 
 
 def test_a_link_without_visuals_shows_its_collisions():
-    cube, ball = Collision(name="c", shape=Box((1, 1, 1)), pose=Pose(), mu=1.0), Visual("v", Sphere(0.1), Pose(), (1, 0, 0, 1))
-    links = (Link(name="seen", pose=Pose(), inertia=None, collisions=(cube,), visuals=(ball,)), Link(name="lost", pose=Pose(), inertia=None, collisions=(cube,), visuals=()))
-    (painted,) = paint(Model(name="m", pose=Pose(), static=True, links=links, joints=(), spans=(), line=1))
+    cube, ball = (
+        Collision(name="c", shape=Box((1, 1, 1)), pose=Pose(), mu=1.0),
+        Visual("v", Sphere(0.1), Pose(), (1, 0, 0, 1)),
+    )
+    links = (
+        Link(name="seen", pose=Pose(), inertia=None, collisions=(cube,), visuals=(ball,)),
+        Link(name="lost", pose=Pose(), inertia=None, collisions=(cube,), visuals=()),
+    )
+    (painted,) = paint(
+        Model(name="m", pose=Pose(), static=True, links=links, joints=(), spans=(), line=1)
+    )
     assert len(painted.faces) == len(sphere(0.1).faces) + 12
     # The robot is one mesh, too.
     assert np.isfinite(*[item.vertices for item in paint(ROBOT)]).all()
@@ -143,7 +157,11 @@ def test_a_finished_test_is_played_by_the_browser(writer, screen, player):
         with pytest.raises(UserError):
             player.play(number)
     before = set(screen.things)
-    for message in (*player.drawings("way", 1), *player.drawings("ghost-way", 2), *player.drawings("still", 1)):
+    for message in (
+        *player.drawings("way", 1),
+        *player.drawings("ghost-way", 2),
+        *player.drawings("still", 1),
+    ):
         screen.take(message)
     # Nothing is removed in it any more.
     ways = {"/world/trail", "/world/ghost-trail"}
@@ -159,17 +177,33 @@ def test_a_run_with_a_moved_model_is_the_ghost_of_one_without(writer, screen, pl
     writer.reduce()
     number = {"now": 1.5, "low": -1.5, "high": 4.5, "scale": 3.0, "resolution": 0.01, "unit": "m"}
     numbers = [number | {"name": name} for name in ("left wall.y", "left wall.friction")]
-    began = {"environment": 1, "rate": 1.0, "error": 0.01, "budget": 50, "certified": False, "status": "stopped"}
+    began = {
+        "environment": 1,
+        "rate": 1.0,
+        "error": 0.01,
+        "budget": 50,
+        "certified": False,
+        "status": "stopped",
+    }
     writer.append("margins_started", {"numbers": numbers, "before": "stopped", **began})
     ended = {"failure": "", "distance": None, "end_pose": None, "wall_seconds": 0.1}
     for one in numbers:
         for run in range(6):
-            ran = {"name": one["name"], "value": 2.5, "run": run, "seed": run, "outcome": "pass"} | ended
+            ran = {
+                "name": one["name"],
+                "value": 2.5,
+                "run": run,
+                "seed": run,
+                "outcome": "pass",
+            } | ended
             writer.append("margin_ran", ran, {"": straight(6.0).tobytes()})
     writer.append("margins_finished", {})
     player.tick(20)
     pairs = player.pairs()["pairs"]
-    assert [(pair["test"], pair["ghost"], round(pair["apart"], 3)) for pair in pairs] == [(2, -1, 0.3), (2, -7, 0.3)]
+    assert [(pair["test"], pair["ghost"], round(pair["apart"], 3)) for pair in pairs] == [
+        (2, -1, 0.3),
+        (2, -7, 0.3),
+    ]
     assert pairs[0]["title"] == "now and with left wall.y = 2.5 (test 2, seed 0)"
     play = player.play(-1)
     assert (play["title"], play["robot"][-1][:2]) == ("left wall.y = 2.5 · pass", [8, 6])
@@ -198,28 +232,71 @@ def test_partitions_have_the_colours_and_letters_of_the_map(writer, screen, play
     assert [each[5] for each in words["parts"]] == ["", "", "003 board", ""]
     writer.reduce()
     player.tick(30)
-    assert words["parts"] == [] and not any(path.startswith("/world/parts") for path in screen.things)
+    assert words["parts"] == [] and not any(
+        path.startswith("/world/parts") for path in screen.things
+    )
 
 
 def test_a_large_world_is_a_few_objects(screen):
-    still = [Model(name=f"m{number}", pose=Pose((number, 0, 0)), static=True, links=(_boxed(number),), joints=(), spans=(), line=1) for number in range(400)]
+    still = [
+        Model(
+            name=f"m{number}",
+            pose=Pose((number, 0, 0)),
+            static=True,
+            links=(_boxed(number),),
+            joints=(),
+            spans=(),
+            line=1,
+        )
+        for number in range(400)
+    ]
     world = World(path=ROOT, name="large", text=b"", gravity=(0, 0, -9.8), models=tuple(still))
     scenery = Scenery(Stage(screen.take), world, Wheels(ROBOT), world.elements())
     half = frozenset(f"m{number}" for number in range(200))
-    scenery.show(Shot(kind="start", test=None, models=half, left_out=frozenset(), removed=frozenset(world.elements()) - half, title=""))
+    scenery.show(
+        Shot(
+            kind="start",
+            test=None,
+            models=half,
+            left_out=frozenset(),
+            removed=frozenset(world.elements()) - half,
+            title="",
+        )
+    )
     assert len(screen.things) < 20
     assert {
         "/world/models/still",
         "/world/removed/all",
     } < screen.things.keys() and "/world/left-out/all" not in screen.things
-    scenery.show(Shot(kind="start", test=None, models=frozenset(), left_out=half, removed=frozenset(), title=""))
+    scenery.show(
+        Shot(
+            kind="start",
+            test=None,
+            models=frozenset(),
+            left_out=half,
+            removed=frozenset(),
+            title="",
+        )
+    )
     assert "/world/models/still" not in screen.things and "/world/left-out/all" in screen.things
-    for message in scenery.still(Shot(kind="start", test=None, models=half, left_out=frozenset(), removed=frozenset(), title="")):
+    for message in scenery.still(
+        Shot(
+            kind="start",
+            test=None,
+            models=half,
+            left_out=frozenset(),
+            removed=frozenset(),
+            title="",
+        )
+    ):
         screen.take(message)
     assert "/world/models/still" in screen.things and "/world/left-out/all" not in screen.things
     hues = ((1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0))
     places = scenery.parts((str(number), hues[number % 3], [f"m{number}"]) for number in range(400))
-    assert len(places) == MOST_LETTERS and sum(path.startswith("/world/parts") for path in screen.things) == 3
+    assert (
+        len(places) == MOST_LETTERS
+        and sum(path.startswith("/world/parts") for path in screen.things) == 3
+    )
 
 
 def _boxed(number):
@@ -263,7 +340,9 @@ def test_path_on_ground_is_below_a_tilted_robot():
     assert path_on_ground(on_its_side, -0.5)[0] == pytest.approx((0, 0.45, 1))
 
 
-def test_a_late_browser_gets_the_same_and_the_stage_does_not_grow(writer, screen, stage, player, words):
+def test_a_late_browser_gets_the_same_and_the_stage_does_not_grow(
+    writer, screen, stage, player, words
+):
     writer.round()
     writer.reduce()
     player.tick(15)
@@ -281,7 +360,9 @@ def test_a_late_browser_gets_the_same_and_the_stage_does_not_grow(writer, screen
     assert words["models"] == "2 of 4 models"
 
 
-def test_an_earlier_moment_and_a_row_of_it_are_shown_until_the_present_is_wanted_again(writer, player, words):
+def test_an_earlier_moment_and_a_row_of_it_are_shown_until_the_present_is_wanted_again(
+    writer, player, words
+):
     writer.round()
     begun = writer.run.events()[-1].id
     writer.reduce()

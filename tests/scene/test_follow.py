@@ -68,7 +68,15 @@ def test_a_try_has_its_own_models(writer):
     writer.append("trial_started", {"trial": 1, "models": [0, 2]})
     writer.append(
         "test_started",
-        {"test": 2, "phase": "hand", "round": None, "candidate": None, "trial": 1, "run": 0, "seed": 0},
+        {
+            "test": 2,
+            "phase": "hand",
+            "round": None,
+            "candidate": None,
+            "trial": 1,
+            "run": 0,
+            "seed": 0,
+        },
     )
     found = shot(state_of(writer), [live(2)])
     assert (found.models, found.title) == ({"left wall", "board"}, "try 1 · test 2 · runs now")
@@ -96,13 +104,18 @@ def test_a_fresh_run_shows_its_own_environment(writer, together):
     gone = frozenset(elements[: 1 + together])
     more = " and 1 more" if together else ""
     left = list(range(1 + together, len(elements)))
-    assert shown(environment=left, without=0) == (everything - gone, f"the whole world without {elements[0]}{more}")
+    assert shown(environment=left, without=0) == (
+        everything - gone,
+        f"the whole world without {elements[0]}{more}",
+    )
 
 
 def test_a_reduction_is_shown_while_it_waits_and_in_what_is_left(in_round):
     in_round.start_test(2, candidate=0)
     in_round.finish_test(2, "similar")
-    in_round.append("candidate_judged", {"candidate": 0, "verdict": "similar", "tests": [2], "known": 0})
+    in_round.append(
+        "candidate_judged", {"candidate": 0, "verdict": "similar", "tests": [2], "known": 0}
+    )
     in_round.append("waiting", {"candidate": 0})
     found = shot(state_of(in_round), [])
     assert (found.kind, found.test, found.left_out) == ("replay", 2, {"board", "asphalt"})

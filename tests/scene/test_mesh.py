@@ -60,7 +60,9 @@ def test_round_shapes_are_almost_round(radii, length):
         assert 0.95 < volume(surface) / exact < 1.0
         assert np.abs(surface.vertices).max(axis=0) == pytest.approx(reach, rel=1e-6)
         if not isinstance(shape, Capsule):
-            assert np.linalg.norm(surface.vertices / reach, axis=1) == pytest.approx(np.ones(len(surface.vertices)))
+            assert np.linalg.norm(surface.vertices / reach, axis=1) == pytest.approx(
+                np.ones(len(surface.vertices))
+            )
 
 
 def as_mesh(surface: mesh.Surface) -> Mesh:

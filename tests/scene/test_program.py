@@ -62,9 +62,13 @@ def listening(pid: int) -> list[str]:
 Told = list[bytes | str]
 
 
-async def messages(url: str, enough: Callable[[Told], bool] = bool, headers: dict[str, str] | None = None) -> Told:
+async def messages(
+    url: str, enough: Callable[[Told], bool] = bool, headers: dict[str, str] | None = None
+) -> Told:
     """What a browser is told from its first moment until that is `enough`."""
-    connection = await websocket_connect(HTTPRequest(feed_of(url), headers=headers or {}), max_message_size=10_000_000)
+    connection = await websocket_connect(
+        HTTPRequest(feed_of(url), headers=headers or {}), max_message_size=10_000_000
+    )
     found: Told = []
     while not enough(found):
         found.append(await asyncio.wait_for(connection.read_message(), PATIENCE))
@@ -85,8 +89,12 @@ def titled(title: str) -> Callable[[Told], bool]:
 def matrix_of(found: Told, path: str) -> np.ndarray:
     """Where a browser has put what is at a path: the last transform, 4 x 4."""
     handlers = {code: lambda ext: ext for code in range(0x11, 0x19)}
-    commands = [umsgpack.unpackb(one, ext_handlers=handlers) for one in found if isinstance(one, bytes)]
-    matrices = [one["matrix"] for one in commands if one["type"] == "set_transform" and one["path"] == path]
+    commands = [
+        umsgpack.unpackb(one, ext_handlers=handlers) for one in found if isinstance(one, bytes)
+    ]
+    matrices = [
+        one["matrix"] for one in commands if one["type"] == "set_transform" and one["path"] == path
+    ]
     return np.array(matrices[-1]).reshape(4, 4).T if matrices else np.eye(4)
 
 
@@ -114,7 +122,15 @@ def test_listens_on_loopback_only(writer, start_scene):
 
 async def test_nobody_watches_without_the_token(url):
     root, token = url.rsplit("/", 2)[:2]
-    for path in ("", "static/", "feed", "main.min.js", f"{token[:-1]}/", f"{'x' * len(token)}/", f"{token[:-1]}/feed"):
+    for path in (
+        "",
+        "static/",
+        "feed",
+        "main.min.js",
+        f"{token[:-1]}/",
+        f"{'x' * len(token)}/",
+        f"{token[:-1]}/feed",
+    ):
         refusal(f"{root}/{path}", 403)
         with pytest.raises(HTTPClientError, match="403"):
             await websocket_connect(feed_of(f"{root}/{path}").removesuffix("feed"))
@@ -125,11 +141,19 @@ async def test_a_browser_gets_the_scene_and_its_words(url):
         return sum(isinstance(message, bytes) and words in message for message in found)
 
     def drawn_and_moving(found):
-        return captions(found) and mention(found, b"set_object") > 10 and mention(found, b"/world/robot") > 2
+        return (
+            captions(found)
+            and mention(found, b"set_object") > 10
+            and mention(found, b"/world/robot") > 2
+        )
 
     words = captions(await messages(url, drawn_and_moving))[-1]
     assert (words["name"], words["models"]) == ("small", "4 of 4 models")
-    assert (words["title"], words["kind"], words["test"]) == ("the failure f · test 1 · similar", "replay", 1)
+    assert (words["title"], words["kind"], words["test"]) == (
+        "the failure f · test 1 · similar",
+        "replay",
+        1,
+    )
 
 
 def test_a_page_may_ask_for_itself_and_finished_tests_and_for_nothing_else(url):
@@ -146,7 +170,15 @@ def test_a_page_may_ask_for_itself_and_finished_tests_and_for_nothing_else(url):
     assert int.from_bytes(drawn[:4], "big") == len(drawn) - 4
     for path in ("play/2", "play/0", "play/-1", "play/999999999", "still/7", "ghost-way/7"):
         assert refusal(url + path, 404).count(b"\n") == 0
-    for path in ("play/--1", "play/1-", "play/1/2", "play/x", "play/1000000000", "index.js", "main.js"):
+    for path in (
+        "play/--1",
+        "play/1-",
+        "play/1/2",
+        "play/x",
+        "play/1000000000",
+        "index.js",
+        "main.js",
+    ):
         refusal(url + path, 403)
     for path in ("../__init__.py", "%2e%2e/%2e%2e/visualizer.py"):
         refusal(url + path, 403)
@@ -156,13 +188,25 @@ def test_a_page_may_ask_for_itself_and_finished_tests_and_for_nothing_else(url):
 async def test_a_running_test_is_followed(in_round, start_scene):
     in_round.start_test(2, candidate=1)
     with engine_lock(in_round.path):
-        in_round.run.set_live([Live(slot=0, test=2, time=1.5, pose=(1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
+        in_round.run.set_live(
+            [Live(slot=0, test=2, time=1.5, pose=(1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))]
+        )
         url = url_of(start_scene(in_round.path))
         words = captions(await messages(url, titled("round 1 · part B · test 2 · runs now")))[-1]
         assert words["time"] == "1.5 s of 45 s"
         # The board is pushed 0.5 m, and the robot drives 0.3 m, so far as its wheels roll.
         board = {"board": (1.5, -1.5, 0.1, 1.0, 0.0, 0.0, 0.0)}
-        in_round.run.set_live([Live(slot=0, test=2, time=1.8, pose=(1.3, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0), models=board)])
+        in_round.run.set_live(
+            [
+                Live(
+                    slot=0,
+                    test=2,
+                    time=1.8,
+                    pose=(1.3, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0),
+                    models=board,
+                )
+            ]
+        )
         found = await messages(url, lambda told: matrix_of(told, "/world/models/003 board")[0, 3])
         assert matrix_of(found, "/world/models/003 board")[:3, 3] == pytest.approx([0.5, 0.0, 0.0])
         wheel = matrix_of(found, "/world/robot/wheel 0")
@@ -195,7 +239,10 @@ async def test_pages_from_elsewhere_are_refused_and_own_ones_are_welcome_also_th
     evil = "http://evil.example"
     # The last one has a name that was made to lead here.
     for origin, host in (
-        *((origin, None) for origin in (evil, "http://127.0.0.1.evil.example", "null", "http://[", "file://", "")),
+        *(
+            (origin, None)
+            for origin in (evil, "http://127.0.0.1.evil.example", "null", "http://[", "file://", "")
+        ),
         (f"{evil}:7000", "evil.example:7000"),
     ):
         with pytest.raises(HTTPClientError) as error:
@@ -206,7 +253,8 @@ async def test_pages_from_elsewhere_are_refused_and_own_ones_are_welcome_also_th
 
 
 @pytest.mark.parametrize(
-    "number", slow(pytest.mark.programs, [signal.SIGTERM, signal.SIGINT, signal.SIGHUP], but=[signal.SIGINT])
+    "number",
+    slow(pytest.mark.programs, [signal.SIGTERM, signal.SIGINT, signal.SIGHUP], but=[signal.SIGINT]),
 )
 async def test_browsers_come_and_go_and_it_ends_cleanly(writer, start_scene, number):
     writer.baseline()
@@ -229,7 +277,9 @@ def test_ends_with_its_parent(writer):
         f"child = subprocess.Popen([sys.executable, '-m', 'ddenv.scene', {str(writer.path)!r}], stdout=subprocess.PIPE)\n"
         "print(child.pid, child.stdout.readline().decode(), flush=True)"
     )
-    parent = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, check=True)
+    parent = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, check=True
+    )
     port = int(parent.stdout.split(":")[2].split("/")[0])
 
     def gone():
@@ -295,7 +345,9 @@ def test_user_errors_are_one_line(start_scene, words):
 
 
 @pytest.mark.programs
-async def test_a_run_file_that_is_damaged_before_or_while_it_is_shown_is_one_line(writer, start_scene):
+async def test_a_run_file_that_is_damaged_before_or_while_it_is_shown_is_one_line(
+    writer, start_scene
+):
     process = start_scene(writer.path)
     connection = await websocket_connect(feed_of(url_of(process)))
     writer.append("nonsense", {})

@@ -43,14 +43,20 @@ def wall(folder: Path, name: str = "wall", oracle: str = "", **reduction) -> Pat
     """The scenario of the small world under another `name`; returns its YAML file."""
     scenario = load_scenario(DATA / "wall.yaml")
     data = json.loads(scenario.model_dump_json(exclude_unset=True))
-    data |= {"name": name, "folder": str(folder), **({"oracle": {"command": oracle}} if oracle else {})}
+    data |= {
+        "name": name,
+        "folder": str(folder),
+        **({"oracle": {"command": oracle}} if oracle else {}),
+    }
     data["reduction"] |= {"slice": False} | reduction
     path = folder / f"{name}.yaml"
     path.write_text(yaml.safe_dump(data))
     return path
 
 
-def plan_of(*files: Path, pairs: str = TWO_PAIRS, algorithms: str = "ddenv", seeds: int = 1, **options) -> Plan:
+def plan_of(
+    *files: Path, pairs: str = TWO_PAIRS, algorithms: str = "ddenv", seeds: int = 1, **options
+) -> Plan:
     return make_plan([str(file) for file in files], pairs, algorithms, seeds, **options)
 
 

@@ -27,7 +27,14 @@ class Engine:
 
     def __init__(self, lab: Lab, run: Path, jobs: int, share: Path | None = None) -> None:
         self._lab, self._run = lab, run
-        given = {"jobs": jobs, "cluster": None, "share": share, "after": None, "anyway": "no", "attended": "no"}
+        given = {
+            "jobs": jobs,
+            "cluster": None,
+            "share": share,
+            "after": None,
+            "anyway": "no",
+            "attended": "no",
+        }
         self._options = Namespace(
             accept_mode="automatic", bits="same", certify=None, isolate=None, margins=None, **given
         )
@@ -75,7 +82,9 @@ class Lab:
         # No program starts.
         monkeypatch.setattr(program, "check_trusted", lambda *_: None)
 
-    def start_engine(self, run: Path, jobs: int, accept_mode: str = "automatic", share: Path | None = None) -> Engine:
+    def start_engine(
+        self, run: Path, jobs: int, accept_mode: str = "automatic", share: Path | None = None
+    ) -> Engine:
         self.started.append((run.stem, jobs))
         return Engine(self, run, jobs, share)
 

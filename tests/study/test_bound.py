@@ -13,7 +13,9 @@ from ddenv.study.results import Result
 def subsets(models, sizes):
     """Sets of models as bits."""
     return frozenset(
-        sum(1 << model for model in chosen) for size in sizes for chosen in combinations(range(models), size)
+        sum(1 << model for model in chosen)
+        for size in sizes
+        for chosen in combinations(range(models), size)
     )
 
 
@@ -43,7 +45,9 @@ def optimum(models, needed, iterations, sizes):
 
 def bound(models, needed, misses, baseline_runs=0):
     """That of a result which has left `needed` of `models` models."""
-    cell = SimpleNamespace(scenario=SimpleNamespace(reduction=SimpleNamespace(baseline_runs=baseline_runs)))
+    cell = SimpleNamespace(
+        scenario=SimpleNamespace(reduction=SimpleNamespace(baseline_runs=baseline_runs))
+    )
     names = tuple(map(str, range(models)))
     return Result(cell=cell, elements=names, left=names[:needed], misses=misses).bound
 

@@ -78,7 +78,10 @@ def test_a_study_runs_to_its_end(undisturbed, two_by_two):
         assert cell.label in line and "2 models" in line
         assert f"{row['tests']} tests and {row['certificate_tests']} for the certificate" in line
     assert [row["names"] for row in told(folder)] == ["deck wall"] * 4
-    assert all(row["left_f"] == row["left_runs"] > "0" and row["without_most"] == "0.0" for row in told(folder))
+    assert all(
+        row["left_f"] == row["left_runs"] > "0" and row["without_most"] == "0.0"
+        for row in told(folder)
+    )
     (session,) = sessions(folder)
     assert (session.jobs, session.tests) == (2, lab.made)
     assert len(lab.started) == 4
@@ -89,10 +92,18 @@ def test_what_another_cell_has_tested_is_not_tested_again(undisturbed, two_by_tw
     found = [read_cell(folder, cell) for cell in two_by_two.cells]
     # Nothing between scenarios, whose seeds differ.
     assert [each.taken_over > 0 for each in found] == [False, True, False, True]
-    assert sum(each.tests + each.certificate_tests + each.ahead - each.taken_over for each in found) == lab.made
+    assert (
+        sum(each.tests + each.certificate_tests + each.ahead - each.taken_over for each in found)
+        == lab.made
+    )
     assert [each.tests for each in found[:2]] == [each.tests for each in found[2:]]
     # The second cell ends with the same models: it has the whole certificate of the first.
-    assert [each.taken_over >= each.certificate_tests for each in found] == [False, True, False, True]
+    assert [each.taken_over >= each.certificate_tests for each in found] == [
+        False,
+        True,
+        False,
+        True,
+    ]
 
 
 def test_run_again_it_makes_only_what_is_missing(undisturbed, two_by_two, lab, tmp_path):
@@ -136,7 +147,9 @@ def until_stopped(run, *_):
         wait_until(file.commands)
 
 
-def test_terminated_it_writes_what_it_has_and_goes_on(tmp_path, lab, two_by_two, undisturbed, capsys):
+def test_terminated_it_writes_what_it_has_and_goes_on(
+    tmp_path, lab, two_by_two, undisturbed, capsys
+):
     asked = []
 
     def terminate(run, made):
@@ -294,9 +307,14 @@ def test_a_run_of_something_else_is_refused_in_one_line(tmp_path, lab):
             study(folder, plan_of(file, **ONE, **options))
         return str(error.value)
 
-    told, leave = f"{run}: was made with another", f"choose another folder with -o, or delete {folder}/runs"
+    told, leave = (
+        f"{run}: was made with another",
+        f"choose another folder with -o, or delete {folder}/runs",
+    )
     assert refused(epsilon=0.5) == f"{told} scenario, or with other options; {leave}"
-    (tmp_path / "wall.sdf").write_text((tmp_path / "wall.sdf").read_text().replace("far_box", "far_bin"))
+    (tmp_path / "wall.sdf").write_text(
+        (tmp_path / "wall.sdf").read_text().replace("far_box", "far_bin")
+    )
     assert refused() == f"{told} world; {leave}"
     with sqlite3.connect(run) as db:
         db.execute("DELETE FROM event")

@@ -10,7 +10,14 @@ from ddenv.study.folder import ABOUT, Session, machine, opened, sessions, versio
 from ddenv.study.plan import RUNS
 
 SESSIONS = (
-    Session(begun=1.5e9, seconds=12.5, jobs=2, tests=40, versions="ddenv 1", machine="a machine, 2 cores"),
+    Session(
+        begun=1.5e9,
+        seconds=12.5,
+        jobs=2,
+        tests=40,
+        versions="ddenv 1",
+        machine="a machine, 2 cores",
+    ),
     Session(begun=1.6e9, seconds=0.0, jobs=4, tests=0, versions="ddenv 2", machine="\u05e9"),
 )
 
@@ -68,7 +75,9 @@ DAMAGED = (
 @pytest.mark.parametrize("text", DAMAGED, ids=lambda text: text[:12])
 def test_a_damaged_list_of_times_is_one_line(tmp_path, text):
     (tmp_path / ABOUT).write_text(text)
-    with pytest.raises(UserError, match=rf"{ABOUT}: is damaged; delete it \(the runs are not affected\)"):
+    with pytest.raises(
+        UserError, match=rf"{ABOUT}: is damaged; delete it \(the runs are not affected\)"
+    ):
         sessions(tmp_path)
 
 

@@ -19,8 +19,17 @@ from tests.study.made import LONGEST, crates, holds, never_failed, plan_of, redu
 from tests.workbench import fake_run
 
 SESSIONS = (
-    Session(begun=1.6e9, seconds=90.0, jobs=2, tests=30, versions="ddenv 1", machine="<b>first</b> machine"),
-    Session(begun=1.7e9, seconds=30.0, jobs=4, tests=9, versions="ddenv 2", machine="second machine"),
+    Session(
+        begun=1.6e9,
+        seconds=90.0,
+        jobs=2,
+        tests=30,
+        versions="ddenv 1",
+        machine="<b>first</b> machine",
+    ),
+    Session(
+        begun=1.7e9, seconds=30.0, jobs=4, tests=9, versions="ddenv 2", machine="second machine"
+    ),
 )
 
 
@@ -42,7 +51,9 @@ def study(tmp_path_factory):
     reduced(folder, three, ["crate_03"], vain=1)
     never_failed(folder, never)
     chance_left = ["crate_03", "crate_07"]
-    reduced(folder, chance, chance_left, claims=holds(chance_left) | {"crate_07": ("not shown", "spsp")})
+    reduced(
+        folder, chance, chance_left, claims=holds(chance_left) | {"crate_07": ("not shown", "spsp")}
+    )
     return (*written(plan, folder), folder, plan)
 
 
@@ -54,7 +65,10 @@ def test_several_seeds_are_told_as_median_and_range(study):
     # Behind it: re-runs, what is left, f in the whole world, in what is left and without a model, steps back, and the bound.
     left = "`crate_00`, `crate_01` (2 of 3); `crate_03` (1 of 3)"
     rates = "9 of 12 (33 % to 97 %) | 15 of 15 (72 % to 100 %) | at most 0 of 4 (0 % to 66 %)"
-    assert f"| model2model/failure-proximal | 46 % (33 % to 53 %) | {left} | {rates} | 0 | 13 |" in text
+    assert (
+        f"| model2model/failure-proximal | 46 % (33 % to 53 %) | {left} | {rates} | 0 | 13 |"
+        in text
+    )
 
 
 def test_what_went_wrong_is_told_with_its_seed(study):
@@ -68,30 +82,62 @@ def test_what_went_wrong_is_told_with_its_seed(study):
     ):
         assert words in page.text
         assert f"> {words.replace('_', chr(92) + '_')}" in text
-    problems = ["", "", "", "there is no failure to reduce", f"{doubt} (41 % to 100 %)", "not made yet"]
+    problems = [
+        "",
+        "",
+        "",
+        "there is no failure to reduce",
+        f"{doubt} (41 % to 100 %)",
+        "not made yet",
+    ]
     assert [row["problem"] for row in rows] == problems
-    assert page.text.startswith("ddenv study") and "3 of 6 worlds are minimal: 85 % smaller on average" in page.text
+    assert (
+        page.text.startswith("ddenv study")
+        and "3 of 6 worlds are minimal: 85 % smaller on average" in page.text
+    )
     # What has to be kept is said with the result.
-    assert "it is certified if it keeps at least 66 % of the whole world's failure rate" in page.text
+    assert (
+        "it is certified if it keeps at least 66 % of the whole world's failure rate" in page.text
+    )
 
 
 def test_the_table_for_programs_has_a_row_for_each_cell(study):
     *_, rows, folder, plan = study
     assert len(rows) == len(plan.cells)
     told = (
-        *("crates", "ddenv", "model2model", "failure-proximal", "0", "False", "True", "", "11", "2", "0.8182"),
+        *(
+            "crates",
+            "ddenv",
+            "model2model",
+            "failure-proximal",
+            "0",
+            "False",
+            "True",
+            "",
+            "11",
+            "2",
+            "0.8182",
+        ),
         "crate_00 crate_01",
         # The tests, their time, the baseline, the bound, the certificate, and the paper.
         *("13", "13", "6", "15", "15", "1", "0", "26.0", "30.0", "0", "4", "3", "13"),
         *("0.8", "4", "3", "5", "5", "0.415", "1.0", "0.0", "", "", "", __version__),
     )
     assert tuple(rows[0].values())[: len(told)] == told
-    assert list(rows[0])[len(told) - 4 :] == [f"paper_{name}" for name in ("tests", "reduction", "minutes")] + [
-        *("ddenv", "simulator", "run")
-    ]
-    assert (rows[4]["certified"], rows[4]["without_most"], rows[4]["least_to_show"]) == ("False", "0.5", "")
+    assert list(rows[0])[len(told) - 4 :] == [
+        f"paper_{name}" for name in ("tests", "reduction", "minutes")
+    ] + [*("ddenv", "simulator", "run")]
+    assert (rows[4]["certified"], rows[4]["without_most"], rows[4]["least_to_show"]) == (
+        "False",
+        "0.5",
+        "",
+    )
     assert all((folder / row["run"]).is_file() for row in rows[:5])
-    assert (rows[3]["certified"], rows[3]["baseline_runs"], rows[3]["left_runs"]) == ("False", "", "")
+    assert (rows[3]["certified"], rows[3]["baseline_runs"], rows[3]["left_runs"]) == (
+        "False",
+        "",
+        "",
+    )
 
 
 def test_the_page_needs_nothing_else_and_the_markdown_shows_files_that_are_there(study):
@@ -110,10 +156,10 @@ def test_the_page_needs_nothing_else_and_the_markdown_shows_files_that_are_there
 def test_each_minimal_world_is_drawn_once_those_found_most_first(study):
     page, *_ = study
     first = "The minimal world (the paper's Figure 3), the end of 2 of 4 cells: crate_00, crate_01."
-    second = page.text.index("The minimal world (the paper's Figure 3), the end of 1 of 4 cells: crate_03.")
-    unsure = (
-        "What is left, not shown to be minimal (the paper's Figure 3), the end of 1 of 4 cells: crate_03, crate_07."
+    second = page.text.index(
+        "The minimal world (the paper's Figure 3), the end of 1 of 4 cells: crate_03."
     )
+    unsure = "What is left, not shown to be minimal (the paper's Figure 3), the end of 1 of 4 cells: crate_03, crate_07."
     assert page.text.index(first) < second < page.text.index(unsure)
 
 
@@ -151,14 +197,18 @@ def evil(folder: Path) -> Path:
     data = yaml.safe_load(file.read_text())
     data |= {"description": "</p><script>alert(1)</script> # *x*", "protected": []}
     file.write_text(yaml.safe_dump(data))
-    names = [name.translate({ord("<"): "&lt;", ord("&"): "&amp;", ord('"'): "&quot;"}) for name in EVIL]
+    names = [
+        name.translate({ord("<"): "&lt;", ord("&"): "&amp;", ord('"'): "&quot;"}) for name in EVIL
+    ]
     (folder / "crates.sdf").write_bytes(fake_run.world_text(names))
     return file
 
 
 def test_names_are_shown_as_they_are_and_do_nothing(tmp_path):
     (cell,) = (plan := plan_of(evil(tmp_path), pairs="model2model/random")).cells
-    left = reduced(tmp_path, cell, EVIL, claims=holds(EVIL) | {EVIL[0]: ("not needed", "ssss")}).left
+    left = reduced(
+        tmp_path, cell, EVIL, claims=holds(EVIL) | {EVIL[0]: ("not needed", "ssss")}
+    ).left
     page, text, (row,) = written(plan, tmp_path)
     assert not page.tags & {"script", "i", "b"}
     for name in EVIL[:2] + EVIL[3:5]:
@@ -173,7 +223,9 @@ def test_names_are_shown_as_they_are_and_do_nothing(tmp_path):
 def test_the_longest_names_make_files_and_no_figure_takes_the_place_of_another(tmp_path):
     """One scenario left two worlds; another one is called as the first of them might be."""
     plan = plan_of(*(crates(tmp_path, name) for name in ("crates", "crates-1", LONGEST)))
-    for cell, left in zip(plan.cells[::2], (["crate_00"], *[["crate_00", "crate_01"]] * 2), strict=True):
+    for cell, left in zip(
+        plan.cells[::2], (["crate_00"], *[["crate_00", "crate_01"]] * 2), strict=True
+    ):
         reduced(tmp_path, cell, left)
     reduced(tmp_path, plan.cells[1], ["crate_03"])
     page, text, _ = written(plan, tmp_path)

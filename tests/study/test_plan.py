@@ -44,7 +44,10 @@ def test_by_default_it_is_the_papers_three_by_three_in_its_order():
 def test_a_cell_has_all_that_is_asked_for(tmp_path):
     plan = plan_of(crates(tmp_path, seed=40), seeds=2, iterations=2, epsilon=0.7)
     first, second = plan.cells[:2]
-    assert (first.scenario.reduction.pair, first.scenario.reduction.seed) == ("model2model/failure-proximal", 40)
+    assert (first.scenario.reduction.pair, first.scenario.reduction.seed) == (
+        "model2model/failure-proximal",
+        40,
+    )
     assert (first.scenario.reduction.iterations, first.scenario.failure.epsilon) == (2, 0.7)
     assert (second.method, second.scenario.reduction.seed) == (first.method, second.seed)
     assert plan.cells[2].method.pair == "model2model/sequential"
@@ -53,7 +56,9 @@ def test_a_cell_has_all_that_is_asked_for(tmp_path):
 def test_names_come_in_lists_and_count_once(tmp_path):
     files = [str(crates(tmp_path, name)) for name in ("one", "two", "three")]
     plan = make_plan(
-        (f"{files[1]}, {files[0]}", files[2], files[0]), "timeseg/random,paper, timeseg/random", "ddenv,ddenv"
+        (f"{files[1]}, {files[0]}", files[2], files[0]),
+        "timeseg/random,paper, timeseg/random",
+        "ddenv,ddenv",
     )
     assert [scenario.name for scenario in plan.scenarios] == ["two", "one", "three"]
     assert [method.pair for method in plan.methods] == ["timeseg/random", *PAIRS]
@@ -61,7 +66,9 @@ def test_names_come_in_lists_and_count_once(tmp_path):
 
 def test_all_is_all_that_is_installed(tmp_path):
     plan = plan_of(crates(tmp_path), pairs="all", algorithms="all")
-    assert [each.pair for each in plan.methods if each.algorithm == "ddenv"] == list(schemas.pairs())
+    assert [each.pair for each in plan.methods if each.algorithm == "ddenv"] == list(
+        schemas.pairs()
+    )
     assert {each.algorithm for each in plan.methods} == set(schemas.names("algorithm"))
 
 
@@ -80,7 +87,9 @@ def test_methods_that_differ_only_in_what_is_not_looked_at_are_one(tmp_path):
 @pytest.mark.parametrize(("baseline_runs", "iterations"), [(10, 3), (1000, 1000), (1, 0)])
 def test_no_run_of_one_seed_is_a_run_of_another(tmp_path, baseline_runs, iterations):
     plan = plan_of(
-        crates(tmp_path, baseline_runs=baseline_runs, iterations=iterations, seed=7), pairs=PAIRS[0], seeds=4
+        crates(tmp_path, baseline_runs=baseline_runs, iterations=iterations, seed=7),
+        pairs=PAIRS[0],
+        seeds=4,
     )
     # The search, and all certificates that a run can make.
     one = max(baseline_runs, 1 + iterations, LONGEST_BASELINE, MOST_RUNS)
@@ -93,11 +102,15 @@ def test_no_run_of_one_seed_is_a_run_of_another(tmp_path, baseline_runs, iterati
 
 
 def test_a_seed_beyond_the_last_one_is_refused(tmp_path):
-    with pytest.raises(UserError, match="the last seed of crates would be 2147583647; the maximum is 2147483647"):
+    with pytest.raises(
+        UserError, match="the last seed of crates would be 2147583647; the maximum is 2147483647"
+    ):
         plan_of(crates(tmp_path, seed=2**31 - 1), seeds=2)
 
 
-@pytest.mark.parametrize("name", [LONGEST, "a b/../c\\d", "-rf ~", "\u202eabc\n", "..", ":|?*"], ids=ascii)
+@pytest.mark.parametrize(
+    "name", [LONGEST, "a b/../c\\d", "-rf ~", "\u202eabc\n", "..", ":|?*"], ids=ascii
+)
 def test_the_names_of_files_are_files_names(tmp_path, name):
     plan = plan_of(crates(tmp_path, name), pairs="all", algorithms="all", seeds=2)
     assert len({cell.name for cell in plan.cells}) == len(plan.cells)
@@ -110,14 +123,23 @@ def test_the_names_of_files_are_files_names(tmp_path, name):
 
 NAMES = "expected names separated by commas"
 WRONG = (
-    ({"scenarios": ("dich",)}, r"no scenario 'dich' \(did you mean ditch\?\); bundled are ditch, friction"),
+    (
+        {"scenarios": ("dich",)},
+        r"no scenario 'dich' \(did you mean ditch\?\); bundled are ditch, friction",
+    ),
     ({"scenarios": (" , ",)}, rf"--scenarios: {NAMES}; found ' , '"),
-    ({"pairs": "model2model"}, r"--pairs: 'model2model' is not a pair \(did you mean model2model/.*or give 'paper'"),
+    (
+        {"pairs": "model2model"},
+        r"--pairs: 'model2model' is not a pair \(did you mean model2model/.*or give 'paper'",
+    ),
     (
         {"pairs": "paper,timeseg/failur-proximal"},
         r"--pairs: no prioritization 'failur-proximal' \(did you mean failure-proximal\?\).*; or give 'paper' or 'all'",
     ),
-    ({"algorithms": "ddmni"}, r"--algorithms: no algorithm 'ddmni' \(did you mean ddmin\?\).*; or give 'all'"),
+    (
+        {"algorithms": "ddmni"},
+        r"--algorithms: no algorithm 'ddmni' \(did you mean ddmin\?\).*; or give 'all'",
+    ),
     ({"growth": "fast"}, r"options: reduction.growth: 'fast' is not allowed"),
 )
 

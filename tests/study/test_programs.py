@@ -62,7 +62,12 @@ def engine_of(run):
 def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, monkeypatch):
     (tmp_path / "robot.sh").write_text(ROBOT)
     made, most = tmp_path / "made", tmp_path / "most"
-    plan = plan_of(wall(tmp_path, oracle="sh robot.sh {world}"), pairs=WORDS[1], algorithms=WORDS[3], keep_rate=0.5)
+    plan = plan_of(
+        wall(tmp_path, oracle="sh robot.sh {world}"),
+        pairs=WORDS[1],
+        algorithms=WORDS[3],
+        keep_rate=0.5,
+    )
     folder, run = tmp_path / "study", run_path(tmp_path / "study", plan.cells[0])
 
     def stands_at(number):

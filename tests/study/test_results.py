@@ -8,7 +8,18 @@ import pytest
 from ddenv import __version__
 from ddenv.study.plan import run_path
 from ddenv.study.results import read_cell
-from tests.study.made import FRESH, LEFT, TESTS, begun, certified, crates, ended, holds, plan_of, reduced
+from tests.study.made import (
+    FRESH,
+    LEFT,
+    TESTS,
+    begun,
+    certified,
+    crates,
+    ended,
+    holds,
+    plan_of,
+    reduced,
+)
 from tests.workbench import fake_moments
 
 
@@ -37,11 +48,21 @@ def test_a_minimal_cell(done):
     assert (result.minimal, result.problem, result.left) == (True, "", LEFT)
     assert len(result.elements) == 11 and result.smaller == 1 - 2 / 11
     # The baseline, a reduction of one test, and two vain candidates with three re-runs each; every test took 2 s.
-    assert (result.tests, result.reruns, result.seconds, result.misses) == (TESTS, 6, 2.0 * TESTS, 4)
+    assert (result.tests, result.reruns, result.seconds, result.misses) == (
+        TESTS,
+        6,
+        2.0 * TESTS,
+        4,
+    )
     assert (result.certificate_tests, result.certificate_seconds) == (FRESH, 2.0 * FRESH)
     assert result.sizes == ((4, 11), (5, 2), (13, 2))
     # One fresh run was ahead of time.
-    assert (result.ahead, result.taken_over, result.steps_back, result.version) == (1, 0, 0, __version__)
+    assert (result.ahead, result.taken_over, result.steps_back, result.version) == (
+        1,
+        0,
+        0,
+        __version__,
+    )
     assert (result.baseline.failures, result.baseline.runs) == (3, 4)
     assert (result.whole_f, result.whole_runs) == (3, 4)
 
@@ -119,7 +140,13 @@ def test_what_is_not_certified_is_not_minimal_and_says_why(tmp_path, cell, claim
 def test_tests_that_were_taken_over_count_as_any_other(tmp_path, cell, run):
     run.created().baseline()
     test = run.start_round(2) or run.start(0)
-    data = {"outcome": "similar", "failure": "stuck", "distance": 0.1, "end_pose": None, "simulated_seconds": 1.0}
+    data = {
+        "outcome": "similar",
+        "failure": "stuck",
+        "distance": 0.1,
+        "end_pose": None,
+        "simulated_seconds": 1.0,
+    }
     data |= {"first_sensed": [], "first_touched": [], "cut": False}
     run.write("test_finished", test=test, **data, wall_seconds=5.0, taken="another")
     run.judge(0, "similar", [test])
@@ -131,10 +158,14 @@ FINISHED = {"minimal": False, "reason": "no run failed"}
 PROBLEMS = {
     "has not ended": lambda run: run.created(),
     "has not ended ": fake_moments.mid_round,
-    "as you asked": lambda run: run.created().baseline().write("engine_stopped", reason="as you asked"),
+    "as you asked": lambda run: (
+        run.created().baseline().write("engine_stopped", reason="as you asked")
+    ),
     "no disk": lambda run: run.created().write("engine_failed", reason="no disk"),
     "no run failed": lambda run: run.created().write("finished", **FINISHED),
-    "it has no certificate": lambda run: run.created().baseline().write("finished", **FINISHED | {"minimal": True}),
+    "it has no certificate": lambda run: (
+        run.created().baseline().write("finished", **FINISHED | {"minimal": True})
+    ),
 }
 
 
@@ -151,7 +182,10 @@ DAMAGED = {
     "no such test": ("test_finished", {"test": 99}),
     "no such candidate": ("candidate_judged", JUDGED | {"candidate": 7, "tests": []}),
     "tests that are not there": ("candidate_judged", JUDGED | {"tests": [99]}),
-    "a certificate of tests that are not there": ("certificate_finished", {"claims": [], "tests": [99]}),
+    "a certificate of tests that are not there": (
+        "certificate_finished",
+        {"claims": [], "tests": [99]},
+    ),
     "no events": ("", {}),
 }
 
@@ -160,7 +194,9 @@ DAMAGED = {
 def test_a_damaged_run_is_a_problem(done, kind, data):
     with sqlite3.connect(run_path(*done)) as db:
         if kind:
-            db.execute("INSERT INTO event (time, kind, data) VALUES (0, ?, ?)", (kind, json.dumps(data)))
+            db.execute(
+                "INSERT INTO event (time, kind, data) VALUES (0, ?, ?)", (kind, json.dumps(data))
+            )
         else:
             db.execute("DELETE FROM event")
     result = read_cell(*done)

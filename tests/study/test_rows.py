@@ -26,18 +26,62 @@ def certificate(left, *verdicts):
     names = (None, *MODELS[:left])
     verdicts = (*verdicts, *("kept", *["needed"] * left)[len(verdicts) :])
     claims = [
-        Claim(without=name, verdict=verdict, shown=0 if name else 20, runs=10 if name else 20, low=0.0 if name else 0.84, high=0.28 if name else 1.0)
+        Claim(
+            without=name,
+            verdict=verdict,
+            shown=0 if name else 20,
+            runs=10 if name else 20,
+            low=0.0 if name else 0.84,
+            high=0.28 if name else 1.0,
+        )
         for name, verdict in zip(names, verdicts, strict=True)
     ]
-    return Certificate(number=1, node=1, first_run=10_000, keep_rate=0.8, rate=0.95, error=0.03, at_least=10, certify_rate=2 / 3, claims=tuple(claims))
+    return Certificate(
+        number=1,
+        node=1,
+        first_run=10_000,
+        keep_rate=0.8,
+        rate=0.95,
+        error=0.03,
+        at_least=10,
+        certify_rate=2 / 3,
+        claims=tuple(claims),
+    )
 
 
 def result_of(cell, tests, left=1, **other):
     """A minimal cell of 16 models, half of whose tests are re-runs, of 3 s each; 40 more of its certificate."""
-    baseline = BaselineFinished(runs=10, failures=9, rate=0.9, low=0.6, high=1.0, failure_test=1, position=(0.0, 0.0, 0.0), miss_chance=0.0, iterations_95=1, judged=Outcomes({}, {}))
-    values = {"ended": True, "minimal": True, "problem": "", "elements": MODELS, "left": MODELS[:left]}
-    values |= {"tests": tests, "reruns": tests // 2, "seconds": 3.0 * tests, "baseline": baseline, "misses": 4}
-    values |= {"certificate": certificate(left), "certificate_tests": 40, "certificate_seconds": 120.0}
+    baseline = BaselineFinished(
+        runs=10,
+        failures=9,
+        rate=0.9,
+        low=0.6,
+        high=1.0,
+        failure_test=1,
+        position=(0.0, 0.0, 0.0),
+        miss_chance=0.0,
+        iterations_95=1,
+        judged=Outcomes({}, {}),
+    )
+    values = {
+        "ended": True,
+        "minimal": True,
+        "problem": "",
+        "elements": MODELS,
+        "left": MODELS[:left],
+    }
+    values |= {
+        "tests": tests,
+        "reruns": tests // 2,
+        "seconds": 3.0 * tests,
+        "baseline": baseline,
+        "misses": 4,
+    }
+    values |= {
+        "certificate": certificate(left),
+        "certificate_tests": 40,
+        "certificate_seconds": 120.0,
+    }
     values |= {"whole_f": 19, "whole_runs": 20, "sizes": ((10, 16), (tests, left))}
     return Result(cell=cell, **(values | other))
 
@@ -48,7 +92,9 @@ def cells(tmp_path, *tests, pairs=FIVE, seeds=1):
     """
     plan = plan_of(crates(tmp_path, "one"), crates(tmp_path, "two"), pairs=pairs, seeds=seeds)
     made = [
-        Result(cell=cell) if each is None else result_of(cell, abs(each), **(UNCERTIFIED if each < 0 else {}))
+        Result(cell=cell)
+        if each is None
+        else result_of(cell, abs(each), **(UNCERTIFIED if each < 0 else {}))
         for cell, each in zip(plan.cells, tests, strict=True)
     ]
     return plan, made, rows_of(plan, made)
@@ -61,7 +107,11 @@ def words_of(folder, group):
 
 
 # Its certificate does not show that the rate is kept.
-UNCERTIFIED = {"minimal": False, "problem": "it is not shown", "certificate": certificate(1, "not shown")}
+UNCERTIFIED = {
+    "minimal": False,
+    "problem": "it is not shown",
+    "certificate": certificate(1, "not shown"),
+}
 
 
 def ranking(both):
@@ -75,10 +125,27 @@ def test_the_papers_numbers_stand_beside_ours():
     (group,) = rows_of(plan, [result_of(cell, 60, left=2) for cell in plan.cells])
     table = numbers(group)
     assert table.head == (
-        *("partitioning, prioritization", "certified", "search tests", "paper", "certificate tests"),
+        *(
+            "partitioning, prioritization",
+            "certified",
+            "search tests",
+            "paper",
+            "certificate tests",
+        ),
         *("% reduction", "paper", "search minutes", "paper", "certificate minutes"),
     )
-    assert table.rows[0] == (PAIRS[0], "yes", "60", "268", "40", "88 %", "84 %", "3.0", "420", "2.0")
+    assert table.rows[0] == (
+        PAIRS[0],
+        "yes",
+        "60",
+        "268",
+        "40",
+        "88 %",
+        "84 %",
+        "3.0",
+        "420",
+        "2.0",
+    )
     assert table.rows[1] == (PAIRS[1], "yes", "60", "82", "40", "88 %", "95 %", "3.0", "108", "2.0")
 
 
@@ -91,7 +158,15 @@ def test_what_slices_save_stands_beside_the_papers_way():
     table = numbers(group)
     assert table.head == (
         *("partitioning, prioritization", "certified", "search tests", "paper", "with slices"),
-        *("certificate tests", "with slices", "% reduction", "paper", "search minutes", "paper", "certificate minutes"),
+        *(
+            "certificate tests",
+            "with slices",
+            "% reduction",
+            "paper",
+            "search minutes",
+            "paper",
+            "certificate minutes",
+        ),
     )
     assert table.rows[0][1:8] == ("2 of 2", "60", "268", "21", "40", "12", "88 %")
     told = words_of(Path("nowhere"), group)
@@ -101,11 +176,15 @@ def test_what_slices_save_stands_beside_the_papers_way():
 def test_the_claim_counts_what_is_better_than_the_paper():
     plan = make_plan(("ditch",), slice=False)
     # Of 84, 95 and 84 % and of 268, 82 and 359 tests.
-    made = [result_of(cell, tests, left=2) for cell, tests in zip(plan.cells, (269, 82, 30), strict=True)]
+    made = [
+        result_of(cell, tests, left=2)
+        for cell, tests in zip(plan.cells, (269, 82, 30), strict=True)
+    ]
     report = content(plan, made, (), Path("nowhere"))
     told = " ".join(part for each in report.lead for part in each.parts)
     assert (
-        "the same 3 cells of the paper: at least as much removed in 2, no more tests in 2. They took 17 hours" in told
+        "the same 3 cells of the paper: at least as much removed in 2, no more tests in 2. They took 17 hours"
+        in told
     )
     assert report.verdict == "Every world is minimal: 88 % smaller on average"
 
@@ -116,7 +195,9 @@ def test_what_is_not_certified_is_shown_and_is_no_success(tmp_path):
     assert [row[1] for row in numbers(both[0]).rows] == ["no", "yes", "yes", "yes"]
     assert numbers(both[0]).rows[0][2] == "10"
     rows, _ = ranking(both)
-    assert next(iter(rows)) == "model2model/sequential" and rows["model2model/sequential"][0] == Strong("20 ◂")
+    assert next(iter(rows)) == "model2model/sequential" and rows["model2model/sequential"][
+        0
+    ] == Strong("20 ◂")
     assert list(rows)[-1] == "model2model/random"
     assert rows["model2model/random"] == ("not certified", Strong("40 ◂"), "–")
     report = content(plan, made, (), tmp_path)
@@ -133,7 +214,10 @@ def test_half_a_success_is_none(tmp_path, second):
     _, _, both = cells(tmp_path, *tests, pairs=FOUR, seeds=2)
     assert numbers(both[0]).rows[0][1] == "1 of 2"
     rows, _ = ranking(both)
-    assert list(rows)[-1] == "model2model/random" and rows["model2model/random"][0] == "10 (1 of 2 certified)"
+    assert (
+        list(rows)[-1] == "model2model/random"
+        and rows["model2model/random"][0] == "10 (1 of 2 certified)"
+    )
     assert rows["model2model/sequential"][0] == Strong("21 ◂")
 
 
@@ -150,7 +234,10 @@ def test_which_is_best_where(tmp_path):
     assert rows["timeseg/sequential"] == (Strong("19 ◂"), "80", "4.3")
     # What is not minimal everywhere comes last.
     *_, both = cells(tmp_path, 40, 20, 30, 90, 10, *(40, 20, 30, 90, None))
-    assert list(ranking(both)[0].items())[-1] == ("timeseg/sequential", (Strong("10 ◂"), "not made yet", "–"))
+    assert list(ranking(both)[0].items())[-1] == (
+        "timeseg/sequential",
+        (Strong("10 ◂"), "not made yet", "–"),
+    )
 
 
 def test_of_few_methods_or_none_with_an_end_nothing_is_ranked(tmp_path):
@@ -162,10 +249,16 @@ def test_the_figure_has_a_line_for_each_method(tmp_path):
     plan, _, (one, two) = cells(tmp_path, 40, 20, 30, 90, None, *([None] * 5))
     root = ElementTree.fromstring(chart(one))
     lines = [path for path in root.iter(f"{SVG}path") if path.find(f"{SVG}title") is not None]
-    assert [path.find(f"{SVG}title").text for path in lines] == [f"{cell.label}, seed 0" for cell in plan.cells[:4]]
+    assert [path.find(f"{SVG}title").text for path in lines] == [
+        f"{cell.label}, seed 0" for cell in plan.cells[:4]
+    ]
     # From the end of the baseline on, at the top, down to one model; each size holds until the next one.
-    places = [[tuple(map(float, at.split())) for at in path.get("d")[1:].split("L")] for path in lines]
-    assert all(start[1] == middle[1] < end[1] and middle[0] == end[0] for start, middle, end in places)
+    places = [
+        [tuple(map(float, at.split())) for at in path.get("d")[1:].split("L")] for path in lines
+    ]
+    assert all(
+        start[1] == middle[1] < end[1] and middle[0] == end[0] for start, middle, end in places
+    )
     longest = places[3]
     assert all(each[-1][0] < longest[-1][0] and each[0] == longest[0] for each in places[:3])
     words = [text.text for text in root.iter(f"{SVG}text")]
@@ -176,7 +269,9 @@ def test_the_figure_has_a_line_for_each_method(tmp_path):
 
 def test_of_many_methods_the_figure_names_the_papers_and_the_best(tmp_path):
     plan = make_plan(("ditch",), "all", slice=False)
-    (group,) = rows_of(plan, [result_of(cell, 100 - number) for number, cell in enumerate(plan.cells)])
+    (group,) = rows_of(
+        plan, [result_of(cell, 100 - number) for number, cell in enumerate(plan.cells)]
+    )
     words = [text.text for text in ElementTree.fromstring(chart(group)).iter(f"{SVG}text")]
     named = [word.partition(":")[0] for word in words if "left after" in word]
     labels = [method.label for method in plan.methods]
@@ -186,9 +281,14 @@ def test_of_many_methods_the_figure_names_the_papers_and_the_best(tmp_path):
 
 def test_a_world_of_which_all_is_needed_is_drawn_too(tmp_path):
     plan, made, _ = cells(tmp_path, 20, 20, pairs="model2model/random")
-    made = [replace(each, elements=("m0",), left=("m0",), sizes=((10, 1), (14, 1))) for each in made]
+    made = [
+        replace(each, elements=("m0",), left=("m0",), sizes=((10, 1), (14, 1))) for each in made
+    ]
     for group in rows_of(plan, made):
         text = chart(group)
         ElementTree.fromstring(text)
         assert "nan" not in text and "inf" not in text
-    assert content(plan, made, (), tmp_path).verdict == "Every world is minimal: 0 % smaller on average"
+    assert (
+        content(plan, made, (), tmp_path).verdict
+        == "Every world is minimal: 0 % smaller on average"
+    )

@@ -31,7 +31,9 @@ def sliced(run: FakeRun) -> FakeRun:
     run.created().write("still")
     run.met = [f"crate_{number:02}" for number in (2, 3, 4, 6, 7)]
     run.baseline()
-    run.write("sliced", environment=run.numbers(run.met), tests=[1, 2, 3, 4], evidence_test=1, audit=False)
+    run.write(
+        "sliced", environment=run.numbers(run.met), tests=[1, 2, 3, 4], evidence_test=1, audit=False
+    )
     run.write("leg_started", round=1, n_partitions=None)
     run.start_round(3, run.met)
     run.dissimilar(0)
@@ -44,7 +46,9 @@ def sliced(run: FakeRun) -> FakeRun:
 
 def piled(run: FakeRun) -> FakeRun:
     """A round in a world where crates lie on others, with one part judged."""
-    run.created().supports(("crate_02", "crate_05"), ("crate_01", "crate_02"), ("crate_07", "crate_04"))
+    run.created().supports(
+        ("crate_02", "crate_05"), ("crate_01", "crate_02"), ("crate_07", "crate_04")
+    )
     run.baseline()
     run.start_round(3)
     run.dissimilar(0)
@@ -119,7 +123,11 @@ def certifying(run: FakeRun) -> FakeRun:
 def finished(run: FakeRun) -> FakeRun:
     """A run that ended with two models, each shown to be needed."""
     _rounds(run).start_certificate()
-    claims = ((None, "kept", 23 * "s"), ("crate_00", "needed", 9 * "p" + "oo"), ("crate_01", "needed", 11 * "p" + "s"))
+    claims = (
+        (None, "kept", 23 * "s"),
+        ("crate_00", "needed", 9 * "p" + "oo"),
+        ("crate_01", "needed", 11 * "p" + "s"),
+    )
     run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
     return _claimed(run, claims)
 
@@ -137,7 +145,9 @@ def isolating(run: FakeRun) -> FakeRun:
     """After its end, isolation: the robot passes without the two models that were left; without one of them it is being tried."""
     finished(run).start_isolation(2)
     both = run.remove("crate_00", "crate_01")
-    run.write("removal_judged", removal=both, verdict="passes", tests=run.isolate_all(both, "ppppp"))
+    run.write(
+        "removal_judged", removal=both, verdict="passes", tests=run.isolate_all(both, "ppppp")
+    )
     run.live((run.isolate(run.remove("crate_00"), 0), 0.5))
     return run
 
@@ -146,7 +156,9 @@ def isolated(run: FakeRun) -> FakeRun:
     """Isolation has ended: the robot passes without one model."""
     finished(run).start_isolation(2)
     both, one = run.remove("crate_00", "crate_01"), run.remove("crate_00")
-    run.write("removal_judged", removal=both, verdict="passes", tests=run.isolate_all(both, "ppppp"))
+    run.write(
+        "removal_judged", removal=both, verdict="passes", tests=run.isolate_all(both, "ppppp")
+    )
     run.write("removal_judged", removal=one, verdict="passes", tests=run.isolate_all(one, "ppppp"))
     whole = run.remove()
     tests = [*run.isolate_all(one, 20 * "p", 100_000), *run.isolate_all(whole, 9 * "s", 100_000)]
@@ -163,11 +175,38 @@ def with_margins(run: FakeRun) -> FakeRun:
     """Margins of two numbers are known, and a fix that fresh runs confirm."""
     finished(run)
     numbers = (
-        {"name": "crate_00.friction", "now": 0.1, "low": 0.0, "high": 1.0, "scale": 0.9, "resolution": 0.01},
-        {"name": "crate_01.y", "now": 0.5, "low": -2.5, "high": 3.5, "scale": 3.0, "resolution": 0.01, "unit": "m"},
+        {
+            "name": "crate_00.friction",
+            "now": 0.1,
+            "low": 0.0,
+            "high": 1.0,
+            "scale": 0.9,
+            "resolution": 0.01,
+        },
+        {
+            "name": "crate_01.y",
+            "now": 0.5,
+            "low": -2.5,
+            "high": 3.5,
+            "scale": 3.0,
+            "resolution": 0.01,
+            "unit": "m",
+        },
     )
-    began = {"environment": run.state.nodes[run.state.node].id, "rate": 0.95, "error": 0.004, "budget": 100}
-    run.write("margins_started", numbers=numbers, certified=True, status="finished", before=run.state.reason, **began)
+    began = {
+        "environment": run.state.nodes[run.state.node].id,
+        "rate": 0.95,
+        "error": 0.004,
+        "budget": 100,
+    }
+    run.write(
+        "margins_started",
+        numbers=numbers,
+        certified=True,
+        status="finished",
+        before=run.state.reason,
+        **began,
+    )
     tried = (
         ("crate_00.friction", 0.0, "sssss"),
         ("crate_00.friction", 0.2, "sssss"),
@@ -178,7 +217,12 @@ def with_margins(run: FakeRun) -> FakeRun:
     for name, value, outcomes in tried:
         for number, letter in enumerate(outcomes):
             margin_ran(run, name, value, number, letter)
-    run.write("margin_impossible", name="crate_01.y", value=1.25, why="crate_01 would be 0.20 m inside crate_00")
+    run.write(
+        "margin_impossible",
+        name="crate_01.y",
+        value=1.25,
+        why="crate_01 would be 0.20 m inside crate_00",
+    )
     for number in range(20):
         margin_ran(run, "crate_00.friction", 0.4, 500_000_000 + number, "p")
     run.write("margins_finished")
@@ -187,8 +231,16 @@ def with_margins(run: FakeRun) -> FakeRun:
 
 def margin_ran(run: FakeRun, name: str, value: float, number: int, letter: str) -> None:
     """A run with another value ends as this letter says: f, the goal, or lost."""
-    outcome, failure = {"s": ("similar", "stuck"), "p": ("pass", ""), "o": ("other", "lost")}[letter]
-    ended = {"outcome": outcome, "failure": failure, "distance": None, "end_pose": None, "wall_seconds": 2.0}
+    outcome, failure = {"s": ("similar", "stuck"), "p": ("pass", ""), "o": ("other", "lost")}[
+        letter
+    ]
+    ended = {
+        "outcome": outcome,
+        "failure": failure,
+        "distance": None,
+        "end_pose": None,
+        "wall_seconds": 2.0,
+    }
     motions = {ROBOT: path_samples().tobytes()}
     run.write("margin_ran", motions, name=name, value=value, run=number, seed=number, **ended)
 
@@ -202,7 +254,11 @@ def uncertified(run: FakeRun) -> FakeRun:
 def not_shown(run: FakeRun) -> FakeRun:
     """A run that ended with two models, one of which may not be needed."""
     _rounds(run).start_certificate()
-    claims = ((None, "kept", 23 * "s"), ("crate_00", "not shown", 9 * "sp" + "oo"), ("crate_01", "unknown", "pseeeeee"))
+    claims = (
+        (None, "kept", 23 * "s"),
+        ("crate_00", "not shown", 9 * "sp" + "oo"),
+        ("crate_01", "unknown", "pseeeeee"),
+    )
     run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
     return _claimed(run, claims)
 
@@ -210,7 +266,11 @@ def not_shown(run: FakeRun) -> FakeRun:
 def helped(run: FakeRun) -> FakeRun:
     """A run that ended with two models, one of which only helps."""
     _rounds(run).start_certificate()
-    claims = ((None, "kept", 60 * "s"), ("crate_00", "needed", 11 * "p"), ("crate_01", "helps", 12 * "ssssp"))
+    claims = (
+        (None, "kept", 60 * "s"),
+        ("crate_00", "needed", 11 * "p"),
+        ("crate_01", "helps", 12 * "ssssp"),
+    )
     return _claimed(run, claims)
 
 

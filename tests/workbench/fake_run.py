@@ -28,7 +28,9 @@ SIZE = (1.2, 0.8, 0.3)
 END, OTHER_END = (2.0, 0.4, 0.2), (3.0, 1.4, 0.2)
 
 
-def box(name: str, x: float, y: float, yaw: float = 0.0, size: tuple[float, float, float] = SIZE) -> str:
+def box(
+    name: str, x: float, y: float, yaw: float = 0.0, size: tuple[float, float, float] = SIZE
+) -> str:
     width, depth, height = size
     return (
         f'<model name="{name}"><static>true</static><pose>{x} {y} {height / 2} 0 0 {yaw}</pose><link name="link">'
@@ -79,7 +81,9 @@ class FakeRun:
         self.path, self.data = path, data
         self.world = world or world_text()
         documents = {"scenario": json.dumps(data).encode(), "world": self.world, "robot": ROBOT_SDF}
-        self.elements = list(parse_world(self.world, path).elements(frozenset(data.get("protected", ()))))
+        self.elements = list(
+            parse_world(self.world, path).elements(frozenset(data.get("protected", ())))
+        )
         create(path, documents, Created(scenario=data, elements=tuple(self.elements)))
         self.file = RunFile(path)
         self.file.own()
@@ -131,7 +135,15 @@ class FakeRun:
         self.tests += 1
         phase = "baseline" if candidate is None else "round"
         number = None if candidate is None else self.round
-        self.write("test_started", test=self.tests, phase=phase, round=number, candidate=candidate, run=run, seed=run)
+        self.write(
+            "test_started",
+            test=self.tests,
+            phase=phase,
+            round=number,
+            candidate=candidate,
+            run=run,
+            seed=run,
+        )
         return self.tests
 
     def finish(
@@ -144,8 +156,18 @@ class FakeRun:
         end: tuple[float, float, float] = END,
         aside: float = 0.0,
     ) -> None:
-        event = {"test": test, "outcome": outcome, "failure": failure, "distance": distance, "cut": False}
-        event |= {"end_pose": [*end, 1.0, 0.0, 0.0, 0.0], "simulated_seconds": 45.0, "wall_seconds": wall}
+        event = {
+            "test": test,
+            "outcome": outcome,
+            "failure": failure,
+            "distance": distance,
+            "cut": False,
+        }
+        event |= {
+            "end_pose": [*end, 1.0, 0.0, 0.0, 0.0],
+            "simulated_seconds": 45.0,
+            "wall_seconds": wall,
+        }
         event |= {"first_sensed": [], "first_touched": []}
         if self.met is not None:
             event["took_part"] = self.numbers(self.met)
@@ -156,7 +178,12 @@ class FakeRun:
         self.write("test_finished", {ROBOT: way.tobytes()}, **event)
 
     def test(
-        self, candidate: int | None, outcome: str, distance: float | None = None, run: int = 0, failure: str = ""
+        self,
+        candidate: int | None,
+        outcome: str,
+        distance: float | None = None,
+        run: int = 0,
+        failure: str = "",
     ) -> int:
         number = self.start(candidate, run)
         self.finish(number, outcome, distance, failure=failure)
@@ -164,7 +191,9 @@ class FakeRun:
 
     def put_motion(self, test: int, samples: array, model: str = ROBOT) -> None:
         """Another way of a model in a test."""
-        self.file._db.execute("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", (test, model, samples.tobytes()))
+        self.file._db.execute(
+            "INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", (test, model, samples.tobytes())
+        )
 
     def imply(self, candidate: int, by: int) -> int:
         """The first test of a candidate follows from the test `by`."""
@@ -192,7 +221,11 @@ class FakeRun:
 
     def certify_all(self, node: int, without: str | None, outcomes: str) -> None:
         """A run for each letter: s similar, p pass, o another failure, e broken; none where there is a point."""
-        words = {"s": ("similar", 0.12, "stuck"), "p": ("pass", None, ""), "o": ("other", 2.3, "tipped over")}
+        words = {
+            "s": ("similar", 0.12, "stuck"),
+            "p": ("pass", None, ""),
+            "o": ("other", 2.3, "tipped over"),
+        }
         for run, letter in enumerate(outcomes):
             if letter == ".":
                 continue
@@ -202,7 +235,9 @@ class FakeRun:
     def finish_certificate(self, *claims: tuple[str | None, str, str]) -> None:
         """Each claim as (without, verdict, outcomes as in `certify_all`)."""
         tests = [test.id for test in self.state.confirm_tests]
-        self.write("certificate_finished", claims=[self._claim(*each) for each in claims], tests=tests)
+        self.write(
+            "certificate_finished", claims=[self._claim(*each) for each in claims], tests=tests
+        )
 
     def _claim(self, without: str | None, verdict: str, outcomes: str) -> dict:
         shown, runs = outcomes.count("s"), len(outcomes.replace("e", ""))
@@ -210,21 +245,50 @@ class FakeRun:
         pairs = Pairs(both=shown, second=runs - shown)
         bound = pairs.keeps_at_least(0.015) if without is None else pairs.at_most(0.015)
         names = {"s": "similar", "p": "pass", "o": "other", "e": "error"}
-        counts = {name: outcomes.count(letter) for letter, name in names.items() if letter in outcomes}
-        claim = {"without": None if without is None else self.elements.index(without), "verdict": verdict}
-        claim |= {"shown": shown, "runs": runs, "low": low, "high": high, "outcomes": counts, "bound": bound}
+        counts = {
+            name: outcomes.count(letter) for letter, name in names.items() if letter in outcomes
+        }
+        claim = {
+            "without": None if without is None else self.elements.index(without),
+            "verdict": verdict,
+        }
+        claim |= {
+            "shown": shown,
+            "runs": runs,
+            "low": low,
+            "high": high,
+            "outcomes": counts,
+            "bound": bound,
+        }
         return claim
 
     def start_isolation(self, size: int) -> None:
         """Isolation starts; the `size` first models are what the reduction left."""
         self.write("engine_started", pid=2, jobs=2, version=__version__, simulator="none")
-        rule = {"wanted": 0.9, "rather_than": 0.45, "keep_rate": 0.8, "error": 0.05, "at_least": 20, "block": 1000}
+        rule = {
+            "wanted": 0.9,
+            "rather_than": 0.45,
+            "keep_rate": 0.8,
+            "error": 0.05,
+            "at_least": 20,
+            "block": 1000,
+        }
         suspects, before = list(range(len(self.elements))), self.state.reason or "it ended"
-        self.write("isolation_started", isolation=1, run=100_000, **rule, suspects=suspects, size=size, before=before)
+        self.write(
+            "isolation_started",
+            isolation=1,
+            run=100_000,
+            **rule,
+            suspects=suspects,
+            size=size,
+            before=before,
+        )
 
     def remove(self, *names: str) -> int:
         """The number of a removal that is tried now."""
-        self.removals.append([number for number, name in enumerate(self.elements) if name not in names])
+        self.removals.append(
+            [number for number, name in enumerate(self.elements) if name not in names]
+        )
         return len(self.removals)
 
     def isolate(self, removal: int, run: int) -> int:
@@ -236,7 +300,11 @@ class FakeRun:
 
     def isolate_all(self, removal: int, outcomes: str, first: int = 0) -> list[int]:
         """A run for each letter as in `certify_all`; one that reaches the goal goes 1 m further to the side."""
-        words = {"s": ("similar", 0.12, "stuck"), "p": ("pass", None, ""), "e": ("error", None, "it broke")}
+        words = {
+            "s": ("similar", 0.12, "stuck"),
+            "p": ("pass", None, ""),
+            "e": ("error", None, "it broke"),
+        }
         tests = []
         for run, letter in enumerate(outcomes, first):
             outcome, distance, failure = words[letter]
@@ -260,19 +328,40 @@ class FakeRun:
         for run, way in enumerate(ways):
             tests.append(self.start(run=run))
             kind = {"similar": "stuck", "other": "fell"}.get(way, "")
-            self.finish(tests[-1], "failed" if kind else "pass", failure=kind, end=OTHER_END if way == "other" else END)
+            self.finish(
+                tests[-1],
+                "failed" if kind else "pass",
+                failure=kind,
+                end=OTHER_END if way == "other" else END,
+            )
         outcomes = dict(zip(tests, ways, strict=True))
         seen = [{"test": tests[0], "runs": failures, "kinds": ["stuck"], "position": END}]
         if others:
-            seen.append({"test": tests[failures], "runs": others, "kinds": ["fell"], "position": OTHER_END})
+            seen.append(
+                {"test": tests[failures], "runs": others, "kinds": ["fell"], "position": OTHER_END}
+            )
         rate = failures / runs
-        rates = {"rate": rate, "low": 0.3, "high": 0.95, "miss_chance": (1 - rate) ** 4, "iterations_95": 2}
-        found = {"failure_test": tests[0], "position": END, "seen": seen, "outcomes": outcomes, **rates}
+        rates = {
+            "rate": rate,
+            "low": 0.3,
+            "high": 0.95,
+            "miss_chance": (1 - rate) ** 4,
+            "iterations_95": 2,
+        }
+        found = {
+            "failure_test": tests[0],
+            "position": END,
+            "seen": seen,
+            "outcomes": outcomes,
+            **rates,
+        }
         distances = dict.fromkeys(tests[:failures], 0.1)
         self.write("baseline_finished", runs=runs, failures=failures, distances=distances, **found)
         return self
 
-    def start_round(self, parts: int, environment: list[str] | None = None, pinned: tuple[str, ...] = ()) -> None:
+    def start_round(
+        self, parts: int, environment: list[str] | None = None, pinned: tuple[str, ...] = ()
+    ) -> None:
         """A round of `parts` partitions of neighbours, each with its complement; `pinned` models are in all of them."""
         self.round += 1
         whole = self.numbers(environment or self.elements)
@@ -291,11 +380,15 @@ class FakeRun:
         self.write("supports", pairs=[self.numbers(list(pair)) for pair in pairs])
 
     def judge(self, candidate: int, verdict: str, tests: list[int], known: int = 0) -> None:
-        self.write("candidate_judged", candidate=candidate, verdict=verdict, tests=tests, known=known)
+        self.write(
+            "candidate_judged", candidate=candidate, verdict=verdict, tests=tests, known=known
+        )
 
     def dissimilar(self, candidate: int) -> None:
         words = [("pass", "") if run % 2 else ("other", "tipped over") for run in range(4)]
-        tests = [self.test(candidate, outcome, 2.3, run, how) for run, (outcome, how) in enumerate(words)]
+        tests = [
+            self.test(candidate, outcome, 2.3, run, how) for run, (outcome, how) in enumerate(words)
+        ]
         self.judge(candidate, "dissimilar", tests)
 
     def similar(self, candidate: int) -> int:

@@ -28,12 +28,16 @@ from tests.workbench.setup.setup_session import Opened
 def told(screen):
     """The help's words as a user sees them."""
     table = screen.query_one(Static)
-    return "\n".join("".join(segment.text for segment in table.render_line(y)) for y in range(table.size.height))
+    return "\n".join(
+        "".join(segment.text for segment in table.render_line(y)) for y in range(table.size.height)
+    )
 
 
 async def test_help_begins_with_the_focused_pane_and_shows_the_users_own_keys(run):
     fake_moments.mid_round(run)
-    async with Workbench(run.path, config=Config(keys={"run.pause": "f8"})).run_test(size=(80, 24)) as pilot:
+    async with Workbench(run.path, config=Config(keys={"run.pause": "f8"})).run_test(
+        size=(80, 24)
+    ) as pilot:
         await pilot.pause()
         found = groups(pilot.app.screen)
         assert len(found) == 3
@@ -112,15 +116,26 @@ async def test_footer_help_and_commands_offer_only_what_can_be_done_now(run):
         await pilot.app.push_screen(screen := Choosy())
         await pilot.pause()
         footer = screen.query_one(KeyFooter)
-        assert [(entry.words, entry.enabled) for entry in footer.entries] == [("now", True), ("later", False)]
+        assert [(entry.words, entry.enabled) for entry in footer.entries] == [
+            ("now", True),
+            ("later", False),
+        ]
         own = next(group for group in groups(screen) if group.title == "This screen")
-        assert [(each.id, each.enabled) for each in own.shortcuts] == [("choosy.now", True), ("choosy.later", False)]
-        assert [each.id for each in commands(screen) if each.id.startswith("choosy")] == ["choosy.now"]
+        assert [(each.id, each.enabled) for each in own.shortcuts] == [
+            ("choosy.now", True),
+            ("choosy.later", False),
+        ]
+        assert [each.id for each in commands(screen) if each.id.startswith("choosy")] == [
+            "choosy.now"
+        ]
 
 
 def test_serving_is_for_this_machine_alone(runs):
     refused = subprocess.run(
-        [sys.executable, "-m", "ddenv", "serve", "--host", "0.0.0.0"], capture_output=True, text=True, timeout=PATIENCE
+        [sys.executable, "-m", "ddenv", "serve", "--host", "0.0.0.0"],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
     )
     assert refused.returncode == 2 and "only served on 127.0.0.1" in refused.stderr
 
@@ -131,7 +146,9 @@ def test_without_the_package_it_says_what_to_install(monkeypatch):
 
     monkeypatch.setitem(sys.modules, "textual_serve", None)
     monkeypatch.setitem(sys.modules, "textual_serve.server", None)
-    with pytest.raises(UserError, match=r"pip install '\.\[serve\]' in a checkout of ddenv-workbench"):
+    with pytest.raises(
+        UserError, match=r"pip install '\.\[serve\]' in a checkout of ddenv-workbench"
+    ):
         serve(8000)
 
 
@@ -147,8 +164,20 @@ async def test_a_browser_gets_the_app_and_other_pages_do_not(run):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    words = [sys.executable, "-m", "ddenv", "serve", "--port", str(port), "--font-size", "28", str(run.path)]
-    server = await asyncio.create_subprocess_exec(*words, stdout=asyncio.subprocess.PIPE, env=dict(os.environ))
+    words = [
+        sys.executable,
+        "-m",
+        "ddenv",
+        "serve",
+        "--port",
+        str(port),
+        "--font-size",
+        "28",
+        str(run.path),
+    ]
+    server = await asyncio.create_subprocess_exec(
+        *words, stdout=asyncio.subprocess.PIPE, env=dict(os.environ)
+    )
     own = f"http://127.0.0.1:{port}"
     try:
         said = [(await server.stdout.readline()).decode() for _ in range(4)]
@@ -160,7 +189,13 @@ async def test_a_browser_gets_the_app_and_other_pages_do_not(run):
                 text = await page.text()
                 assert page.status == 200 and "textual.js" in text and 'data-font-size="28"' in text
                 assert page.headers["Content-Security-Policy"].startswith("default-src 'none'")
-            for path in ("/", "/ws", "/static/js/textual.js", f"/{'x' * 22}/", home.removeprefix(own)[:-1] + "x/"):
+            for path in (
+                "/",
+                "/ws",
+                "/static/js/textual.js",
+                f"/{'x' * 22}/",
+                home.removeprefix(own)[:-1] + "x/",
+            ):
                 async with session.get(f"{own}{path}") as page:
                     assert page.status == 403
             with pytest.raises(aiohttp.WSServerHandshakeError, match="403"):
@@ -168,8 +203,12 @@ async def test_a_browser_gets_the_app_and_other_pages_do_not(run):
             async with session.get(home, headers={"Host": "elsewhere.example"}) as page:
                 assert page.status == 403
             with pytest.raises(aiohttp.WSServerHandshakeError):
-                await session.ws_connect(f"{home}ws", headers={"Origin": "http://elsewhere.example"})
-            async with session.ws_connect(f"{home}ws?width=120&height=36", headers={"Origin": own}) as socketed:
+                await session.ws_connect(
+                    f"{home}ws", headers={"Origin": "http://elsewhere.example"}
+                )
+            async with session.ws_connect(
+                f"{home}ws?width=120&height=36", headers={"Origin": own}
+            ) as socketed:
                 seen = b""
                 while b"crates" not in seen:
                     message = await socketed.receive(timeout=PATIENCE)

@@ -85,8 +85,15 @@ async def test_b_lists_the_rounds_and_goes_to_the_end_of_one(run):
     async with Attached(run, size=(80, 24)) as session:
         await session.press("b")
         options = session.app.screen.query_one(OptionList)
-        rows = [str(options.get_option_at_index(row).prompt).split() for row in range(options.option_count)]
-        assert [row[:3] for row in rows[:3]] == [["baseline", "11", "0"], ["round", "1", "11"], ["round", "2", "6"]]
+        rows = [
+            str(options.get_option_at_index(row).prompt).split()
+            for row in range(options.option_count)
+        ]
+        assert [row[:3] for row in rows[:3]] == [
+            ["baseline", "11", "0"],
+            ["round", "1", "11"],
+            ["round", "2", "6"],
+        ]
         assert [row[-4:] for row in rows[1:4]] == [
             ["●", "6", "4", "tests"],
             ["●", "2", "5", "tests"],
@@ -103,7 +110,12 @@ async def test_i_shows_the_facts_of_a_test_of_a_round_that_is_over(run):
         dialog = session.app.screen
         assert isinstance(dialog, FactsDialog)
         words = session.dialog()
-        for said in ("● similar: stuck", "0.12 m from the end of f", "2 of 11 models: crate_00, crate_01", "45.0 s  ●"):
+        for said in (
+            "● similar: stuck",
+            "0.12 m from the end of f",
+            "2 of 11 models: crate_00, crate_01",
+            "45.0 s  ●",
+        ):
             assert said in words
         assert "part A of round 2: similar, tests 6" in words
         await session.press("c")
@@ -134,7 +146,8 @@ async def test_the_scene_follows_the_chosen_row_and_the_moment(run, monkeypatch,
     pipe = subprocess.PIPE
     words = [sys.executable, "-u", "-c", code]
     monkeypatch.setattr(
-        "ddenv.runs.programs.start_scene", lambda _: subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True)
+        "ddenv.runs.programs.start_scene",
+        lambda _: subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True),
     )
     fake_moments.mid_round(run).hold()
     async with Attached(run) as session:

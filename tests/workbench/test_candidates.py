@@ -33,13 +33,40 @@ def large(number: int, judged: int = 0) -> Snapshot:
     for index in range(number):
         verdict, tests = ("dissimilar", (index + 1,)) if index < judged else ("", ())
         kind = "complement" if index % 2 else "partition"
-        found.append(Candidate(index=index, kind=kind, partition=index // 2, split=split, distance=0.5, verdict=verdict, tests=tests))
+        found.append(
+            Candidate(
+                index=index,
+                kind=kind,
+                partition=index // 2,
+                split=split,
+                distance=0.5,
+                verdict=verdict,
+                tests=tests,
+            )
+        )
     candidates = PersistentTuple.of(found)
     tests = PersistentTuple.of(
-        runs_state.Test(id=id, environment=0, phase="round", round=1, candidate=id - 1, run=0, seed=0, outcome="pass", distance=1.0) for id in range(1, judged + 1)
+        runs_state.Test(
+            id=id,
+            environment=0,
+            phase="round",
+            round=1,
+            candidate=id - 1,
+            run=0,
+            seed=0,
+            outcome="pass",
+            distance=1.0,
+        )
+        for id in range(1, judged + 1)
     )
     state = RunState(status="running", elements=names, environment=names, tests=tests)
-    return Snapshot(state=state.changed(round=Round(number=1, n_partitions=len(names), split=split, candidates=candidates)), live=(), engine="alive")
+    return Snapshot(
+        state=state.changed(
+            round=Round(number=1, n_partitions=len(names), split=split, candidates=candidates)
+        ),
+        live=(),
+        engine="alive",
+    )
 
 
 class Table(App):
@@ -134,17 +161,36 @@ def test_a_search_that_goes_on_has_its_candidates_again(run):
 
 def test_trials_of_this_place_stand_above_the_candidates(run):
     state = snapshot(fake_moments.mid_round(run)).state
-    judged = [Trial(number=number, models=("crate_00",), node=state.node, verdict="dissimilar", tests=(1,)) for number in range(1, 6)]
-    similar = Trial(number=6, models=("crate_00", "crate_01"), node=state.node, verdict="similar", tests=(1,))
-    trials = (*judged, similar, Trial(number=7, models=(), node=state.node), Trial(number=8, models=(), node=state.node + 1))
+    judged = [
+        Trial(
+            number=number, models=("crate_00",), node=state.node, verdict="dissimilar", tests=(1,)
+        )
+        for number in range(1, 6)
+    ]
+    similar = Trial(
+        number=6, models=("crate_00", "crate_01"), node=state.node, verdict="similar", tests=(1,)
+    )
+    trials = (
+        *judged,
+        similar,
+        Trial(number=7, models=(), node=state.node),
+        Trial(number=8, models=(), node=state.node + 1),
+    )
     rows = rows_of(Snapshot(state=state.changed(trials=trials), live=(), engine="alive"))
     assert [row["candidate"] for row in rows[:5]] == ["try 4", "try 5", "try 6", "try 7", "part A"]
-    assert [row["verdict"] for row in rows[:4]] == ["○ dissimilar", "○ dissimilar", "● a adopts it", ""]
+    assert [row["verdict"] for row in rows[:4]] == [
+        "○ dissimilar",
+        "○ dissimilar",
+        "● a adopts it",
+        "",
+    ]
 
 
 def test_what_matters_least_has_no_column_where_there_is_little_room(run):
     listing = listed(snapshot(fake_moments.mid_round(run)))
-    widths = {width: [column.name for column in fitting(listing, width)] for width in (20, 41, 54, 58, 80)}
+    widths = {
+        width: [column.name for column in fitting(listing, width)] for width in (20, 41, 54, 58, 80)
+    }
     assert widths[20] == widths[41] == ["#", "candidate", "models", "tests", "verdict"]
     assert widths[54] == ["#", "candidate", "models", "tests", "evidence", "verdict"]
     assert "real" in widths[58]
@@ -170,7 +216,14 @@ async def test_keys_and_mouse_move_the_cursor_and_escape_gives_it_back():
         table.show(large(100))
         table.focus()
         await pilot.pause()
-        for key, row in (("end", 99), ("pageup", 89), ("up", 88), ("home", 0), ("pagedown", 10), ("down", 11)):
+        for key, row in (
+            ("end", 99),
+            ("pageup", 89),
+            ("up", 88),
+            ("home", 0),
+            ("pagedown", 10),
+            ("down", 11),
+        ):
             await pilot.press(key)
             assert table.cursor_row == row
             assert table.under_cursor.index == row
@@ -198,7 +251,9 @@ async def test_what_is_looked_at_stays_where_it_is():
         assert app.lines()[1].endswith("○ dissimilar")
         # A trial more moves everything down by a row.
         shown = large(10_000, judged=700)
-        table.show(replace(shown, state=shown.state.changed(trials=(Trial(number=1, models=(), node=0),))))
+        table.show(
+            replace(shown, state=shown.state.changed(trials=(Trial(number=1, models=(), node=0),)))
+        )
         await pilot.pause()
         assert app.lines()[1].startswith("501")
         assert table.under_cursor.index == 9_999

@@ -46,7 +46,9 @@ async def what_keys_change_is_seen(app, size, opened=()):
             await pilot.press(key)
             await pilot.pause()
             now = frame(app, True), frame(app, False)
-            assert (now[0] == before[0]) or (now[1] != before[1]), f"{where}: {key} is seen by colour alone"
+            assert (now[0] == before[0]) or (now[1] != before[1]), (
+                f"{where}: {key} is seen by colour alone"
+            )
             before = now
 
 
@@ -56,8 +58,12 @@ async def test_on_every_screen_over_a_run(run, name):
     await what_keys_change_is_seen(Workbench(run.path), USUAL, OPENED[name])
 
 
-@pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL, LARGE], but=[USUAL]), ids=str)
-@pytest.mark.parametrize("moment", slow(pytest.mark.screens, MOMENTS, but=[fake_moments.waiting]), ids=by_name)
+@pytest.mark.parametrize(
+    "size", slow(pytest.mark.screens, [SMALL, USUAL, LARGE], but=[USUAL]), ids=str
+)
+@pytest.mark.parametrize(
+    "moment", slow(pytest.mark.screens, MOMENTS, but=[fake_moments.waiting]), ids=by_name
+)
 async def test_at_every_moment_of_a_run(run, moment, size):
     moment(run).hold()
     await what_keys_change_is_seen(Workbench(run.path), size)

@@ -44,8 +44,12 @@ def test_without_a_file_or_with_one_that_says_nothing_all_is_as_it_comes(tmp_pat
 
 
 def test_a_file_sets_theme_and_keys(config):
-    config("theme: ansi-dark\nnotify: no\nkeys: {run.pause: f8, map.left: 'h, ctrl+k', run.step: 7}")
-    assert read_config() == Config(ANSI, {"run.pause": "f8", "map.left": "h,ctrl+k", "run.step": "7"}, False)
+    config(
+        "theme: ansi-dark\nnotify: no\nkeys: {run.pause: f8, map.left: 'h, ctrl+k', run.step: 7}"
+    )
+    assert read_config() == Config(
+        ANSI, {"run.pause": "f8", "map.left": "h,ctrl+k", "run.step": "7"}, False
+    )
 
 
 @pytest.mark.parametrize(
@@ -80,7 +84,9 @@ def test_what_is_wrong_is_told_with_its_place(config, text, told):
 @pytest.mark.programs
 def test_a_wrong_file_ends_the_program_before_the_screen(config, runs):
     path = config("keys: {run.puse: p}")
-    done = subprocess.run([sys.executable, "-m", "ddenv"], capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(
+        [sys.executable, "-m", "ddenv"], capture_output=True, text=True, timeout=PATIENCE
+    )
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr.startswith(f"ddenv: {path}: keys: ") and done.stderr.count("\n") == 1
 
@@ -93,7 +99,11 @@ def test_all_keys_can_be_written_as_they_are_told():
     # Two actions may change their keys.
     swapped = {"run.pause": "s", "run.step": "space"}
     assert checked(swapped, "") == swapped
-    assert [shown_key(key) for key in ("question_mark", "shift+left", "S")] == ["?", "shift+←", "shift+s"]
+    assert [shown_key(key) for key in ("question_mark", "shift+left", "S")] == [
+        "?",
+        "shift+←",
+        "shift+s",
+    ]
 
 
 def test_the_command_tells_all_actions_and_what_is_changed(config):
@@ -104,7 +114,9 @@ def test_the_command_tells_all_actions_and_what_is_changed(config):
 
 
 def test_the_example_is_a_file_that_can_be_used(config):
-    example = CliRunner().invoke(command_line, ["config", "--example"], standalone_mode=False).output
+    example = (
+        CliRunner().invoke(command_line, ["config", "--example"], standalone_mode=False).output
+    )
     config(example)
     assert read_config() == Config()
     used = example.replace("\n# theme", "\ntheme").replace("\n  # ", "\n  ")
@@ -118,7 +130,10 @@ def contrast(text, back):
     """As WCAG 2 defines it."""
 
     def light(color):
-        parts = [part / 12.92 if part <= 0.03928 else ((part + 0.055) / 1.055) ** 2.4 for part in color.normalized]
+        parts = [
+            part / 12.92 if part <= 0.03928 else ((part + 0.055) / 1.055) ** 2.4
+            for part in color.normalized
+        ]
         return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2]
 
     bright, dark = sorted((light(text), light(back)), reverse=True)
@@ -128,20 +143,37 @@ def contrast(text, back):
 @pytest.mark.parametrize("theme", OURS, ids=lambda theme: theme.name)
 def test_text_can_be_read_in_our_themes(theme):
     colors = theme.to_color_system().generate()
-    names = ["foreground", "primary", "secondary", "text-primary", "text-error", "text-warning", "text-success"]
+    names = [
+        "foreground",
+        "primary",
+        "secondary",
+        "text-primary",
+        "text-error",
+        "text-warning",
+        "text-success",
+    ]
     names += ["text-accent", "error", "warning", "success", "accent", "footer-key-foreground"]
     for ground in ("background", "surface", "panel"):
         back = Color.parse(colors[ground])
         for name in names:
             assert contrast(Color.parse(colors[name]), back) >= 4.5, (name, ground)
-        muted = back.get_contrast_text(float(colors["text-muted"].removeprefix("auto ").rstrip("%")) / 100)
-        assert contrast(back.blend(muted.rgb and Color(*muted.rgb), muted.a), back) >= 4.5, ("text-muted", ground)
+        muted = back.get_contrast_text(
+            float(colors["text-muted"].removeprefix("auto ").rstrip("%")) / 100
+        )
+        assert contrast(back.blend(muted.rgb and Color(*muted.rgb), muted.a), back) >= 4.5, (
+            "text-muted",
+            ground,
+        )
     cursor = Color.parse(colors["block-cursor-background"])
     assert contrast(cursor.get_contrast_text(), cursor) >= 4.5
 
 
 async def test_a_terminal_with_sixteen_colours_keeps_its_own_which_are_told_in_richs_words():
-    assert (fitting("standard"), fitting("256"), fitting("truecolor")) == (ANSI, DARK.name, DARK.name)
+    assert (fitting("standard"), fitting("256"), fitting("truecolor")) == (
+        ANSI,
+        DARK.name,
+        DARK.name,
+    )
     async with App().run_test() as pilot:
         pilot.app.theme = ANSI
         await pilot.pause()

@@ -74,8 +74,18 @@ CUT = lambda run: run.baseline().write("finished", minimal=False, reason="stoppe
 # What happens after a run was created, the line of the algorithm, and words that are said; first while an engine works.
 WORKING = (
     (counted, 0, "Of 2 runs so far 1 failed and 1 reached the goal"),
-    (writes("noted", about="slow", words="this world is slow: 0.25 s"), 0, "This world is slow: 0.25 s."),
-    (lambda run: run.baseline(), 2, "11 models", "split by model2model", "the robot got stuck in 3 of 4 runs (75 %"),
+    (
+        writes("noted", about="slow", words="this world is slow: 0.25 s"),
+        0,
+        "This world is slow: 0.25 s.",
+    ),
+    (
+        lambda run: run.baseline(),
+        2,
+        "11 models",
+        "split by model2model",
+        "the robot got stuck in 3 of 4 runs (75 %",
+    ),
     (first_run, 5, "First run of part A (4 models), candidate 1 of 6", "within 0.33 m"),
     (rerun("pass"), 7, "Re-run 1 of 3", "the goal was reached"),
     (rerun("other", "tipped over"), 7, "Re-run 1 of 3", "the robot tipped over 2.3 m from f's end"),
@@ -89,7 +99,12 @@ ENDED = (
     (NEVER, None, "The robot never failed in 4 runs."),
     (writes("engine_stopped", reason=""), None, "r resumes"),
     (writes("engine_failed", reason="disk full"), None, "could not go on: disk full"),
-    (used_up, None, "was stopped: the budget of 4 tests is used up.", "c raises it, and the run goes on"),
+    (
+        used_up,
+        None,
+        "was stopped: the budget of 4 tests is used up.",
+        "c raises it, and the run goes on",
+    ),
 )
 BEGUN = (*((each, "alive") for each in WORKING), *((each, "absent") for each in ENDED))
 
@@ -103,20 +118,53 @@ def test_line_and_words_say_what_happens(run, case, engine):
     assert make is not NEVER or found[1] == words[0]
 
 
-MINIMAL = (
-    "Minimal: 2 models left. No single model can be removed: f in 23 of 23 fresh runs (80 % to 100 %), at least 81 %"
-)
+MINIMAL = "Minimal: 2 models left. No single model can be removed: f in 23 of 23 fresh runs (80 % to 100 %), at least 81 %"
 MEANS = "Minimal means: what is left keeps at least 81 % of the whole world's rate"
 CERTIFIES = "they have to show that what is left keeps 66 % of the whole world's rate"
 MOMENTS = (
     (fake_moments.mid_round, "alive", 7, "1 later candidate at the same time"),
     (fake_moments.mid_round, "absent", None, "not running", "r resumes", "2 unfinished tests"),
-    (fake_moments.waiting, "alive", 10, "0.12 m from f's end", "a accepts it (11 → 4 models), x rejects"),
-    (fake_moments.certifying, "alive", 21, CERTIFIES, "So far f shows in 11 of 12 runs of what is left."),
-    (fake_moments.certifying, "alive", 21, "Now: run 5 of everything that is left except crate_00."),
-    (fake_moments.finished, "absent", 21, MINIMAL, MEANS, "crate_00, crate_01", "95 % interval 30 % to 95 %"),
-    (fake_moments.uncertified, "absent", 21, "No single model can be removed; no fresh runs were made."),
-    (fake_moments.not_shown, "absent", 21, "Not shown that each model is needed: tests broke without crate_01"),
+    (
+        fake_moments.waiting,
+        "alive",
+        10,
+        "0.12 m from f's end",
+        "a accepts it (11 → 4 models), x rejects",
+    ),
+    (
+        fake_moments.certifying,
+        "alive",
+        21,
+        CERTIFIES,
+        "So far f shows in 11 of 12 runs of what is left.",
+    ),
+    (
+        fake_moments.certifying,
+        "alive",
+        21,
+        "Now: run 5 of everything that is left except crate_00.",
+    ),
+    (
+        fake_moments.finished,
+        "absent",
+        21,
+        MINIMAL,
+        MEANS,
+        "crate_00, crate_01",
+        "95 % interval 30 % to 95 %",
+    ),
+    (
+        fake_moments.uncertified,
+        "absent",
+        21,
+        "No single model can be removed; no fresh runs were made.",
+    ),
+    (
+        fake_moments.not_shown,
+        "absent",
+        21,
+        "Not shown that each model is needed: tests broke without crate_01",
+    ),
 )
 
 
@@ -184,7 +232,8 @@ def test_what_showed_f_is_run_again_until_it_is_clear_that_it_keeps_the_rate(run
     run.test(0, "similar", 0.1, failure="stuck")
     run.test(0, "pass", run=1)
     assert (
-        "Next is one more run of part A (6 models), candidate 1 of 2: f showed in 1 of 2 runs so far." in told(run)[1]
+        "Next is one more run of part A (6 models), candidate 1 of 2: f showed in 1 of 2 runs so far."
+        in told(run)[1]
     )
     run.live((run.start(0, 2), 0.4))
     words = told(run)[1]
@@ -194,24 +243,39 @@ def test_what_showed_f_is_run_again_until_it_is_clear_that_it_keeps_the_rate(run
 
 def test_where_f_is_rarer_the_key_that_goes_back_is_named(run):
     words = told(fake_moments.rarer(run))[1]
-    assert "f is rarer than it was: f in 1 of 6 here, 3 of 4 in the whole world. u goes back to 11 models." in words
-    assert "rarer" not in told(fake_moments.mid_round(fake_run.FakeRun(run.path.with_name("b.ddenv"))))[1]
+    assert (
+        "f is rarer than it was: f in 1 of 6 here, 3 of 4 in the whole world. u goes back to 11 models."
+        in words
+    )
+    assert (
+        "rarer"
+        not in told(fake_moments.mid_round(fake_run.FakeRun(run.path.with_name("b.ddenv"))))[1]
+    )
 
 
 def test_other_failures_in_the_baseline_are_named_and_counted(run):
     state = fold(run.created().baseline(others=2).file.events())
-    assert "95 %). Other failures: 2. fell at (3.00, 1.40) in 2 runs (--failure selects another one)." in baseline(
-        state
+    assert (
+        "95 %). Other failures: 2. fell at (3.00, 1.40) in 2 runs (--failure selects another one)."
+        in baseline(state)
     )
 
 
 def test_a_baseline_that_goes_on_says_why(run):
     run.created()
     for number in range(4):
-        run.test(None, "failed" if number == 1 else "pass", run=number, failure="stuck" if number == 1 else "")
+        run.test(
+            None,
+            "failed" if number == 1 else "pass",
+            run=number,
+            failure="stuck" if number == 1 else "",
+        )
     assert "The robot runs in the whole world 4 times" in told(run)[1]
     run.start(run=4)
-    assert "Few runs of the whole world show f, or they show several failures, so more runs are made." in told(run)[1]
+    assert (
+        "Few runs of the whole world show f, or they show several failures, so more runs are made."
+        in told(run)[1]
+    )
     assert "Of 4 runs so far 1 failed and 3 reached the goal." in told(run)[1]
 
 
@@ -256,7 +320,13 @@ def test_how_the_user_came_to_this_environment_is_shown_until_a_test_is_made(run
     words = told(run)[1]
     assert words.startswith("Adopted try 4: 3 models. Round 4")
     run.write(
-        "accepted_other", test=8, what="try 2", trial=2, environment=[0, 1], outcomes={"8": "similar"}, distances={}
+        "accepted_other",
+        test=8,
+        what="try 2",
+        trial=2,
+        environment=[0, 1],
+        outcomes={"8": "similar"},
+        distances={},
     )
     assert told(run)[1].startswith("Accepted another failure as f: try 2")
     run.start_round(2, run.elements[:2])
@@ -285,7 +355,9 @@ def test_a_file_that_is_gone_and_another_engine_are_named(run):
     gone = replace(found, gone=True, error="x.ddenv: the run file was deleted", engine="absent")
     assert explain(gone).sentences[0] == "x.ddenv: the run file was deleted."
     other = replace(found, state=found.state.changed(engine_version="0.0.1"), version="0.1.0")
-    assert explain(other).sentences[0].startswith("Another version of ddenv works on this run (0.0.1)")
+    assert (
+        explain(other).sentences[0].startswith("Another version of ddenv works on this run (0.0.1)")
+    )
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,17 @@ from tests.workbench.test_explain import snapshot, told
 def test_lines_of_a_listing_are_in_order_and_every_step_has_one(shown):
     numbers = [number for number, _ in shown.lines]
     assert numbers == sorted(set(numbers))
-    steps = ("baseline", "split", "next", "test", "rerun", "waiting", "reduced", "nothing", "returned")
+    steps = (
+        "baseline",
+        "split",
+        "next",
+        "test",
+        "rerun",
+        "waiting",
+        "reduced",
+        "nothing",
+        "returned",
+    )
     assert {shown.line(step, None) for step in steps} <= set(numbers)
     # The panel of the run screen is so wide inside, without the mark and the number.
     assert all(len(code) <= 49 for _, code in shown.lines)
@@ -21,7 +31,9 @@ def test_lines_of_a_listing_are_in_order_and_every_step_has_one(shown):
 
 def test_the_listing_says_when_n_grows():
     assert (15, " n_partitions ← n_partitions + 1") in listing("ddenv").lines
-    assert (15, " if none similar: n_partitions + 1, or splitting") in listing("ddenv", "steady").lines
+    assert (15, " if none similar: n_partitions + 1, or splitting") in listing(
+        "ddenv", "steady"
+    ).lines
 
 
 def test_every_bundled_algorithm_has_its_own_listing():
@@ -64,7 +76,9 @@ BEGINNINGS = {
 
 
 @pytest.mark.parametrize(("algorithm", "words"), BEGINNINGS.items())
-def test_before_a_round_each_algorithm_says_where_its_candidates_come_from(run_by, algorithm, words):
+def test_before_a_round_each_algorithm_says_where_its_candidates_come_from(
+    run_by, algorithm, words
+):
     line, told_words = told(run_by(algorithm))
     assert line == listing(algorithm).steps["split"]
     assert words in told_words
@@ -102,11 +116,16 @@ def test_ddmin_says_how_n_changes(run_by):
 
 FRUITLESS = {
     ("probdd", 2): "each model left out is now more likely to be needed",
-    ("splitting", 2): "at least one of the models left out is needed; of several, half are left out next",
+    (
+        "splitting",
+        2,
+    ): "at least one of the models left out is needed; of several, half are left out next",
 }
 
 
-@pytest.mark.parametrize(("algorithm", "size", "words"), [(*what, words) for what, words in FRUITLESS.items()])
+@pytest.mark.parametrize(
+    ("algorithm", "size", "words"), [(*what, words) for what, words in FRUITLESS.items()]
+)
 def test_a_group_that_is_needed_is_followed_by_what_that_means(run_by, algorithm, size, words):
     run = run_by(algorithm)
     leave_out(run, list(range(size)))

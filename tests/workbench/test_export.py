@@ -13,7 +13,12 @@ from ddenv.runs.programs import export_mcap
 from ddenv.workbench.export import MEANINGS, ExportScreen
 from ddenv.workbench.help.shortcuts import Help
 
-NAMES = ("crates-1.html", "crates-1.minimal.robot.sdf", "crates-1.minimal.sdf", "crates-1.minimal.yaml")
+NAMES = (
+    "crates-1.html",
+    "crates-1.minimal.robot.sdf",
+    "crates-1.minimal.sdf",
+    "crates-1.minimal.yaml",
+)
 
 
 @pytest.fixture
@@ -42,7 +47,10 @@ async def settled(pilot):
 
 
 def told(pilot):
-    shown = (pilot.app.screen.query_one(f"#export-{kind}", Static).render() for kind in ("words", "wrong"))
+    shown = (
+        pilot.app.screen.query_one(f"#export-{kind}", Static).render()
+        for kind in ("words", "wrong")
+    )
     return " ".join(" ".join(map(str, shown)).split())
 
 
@@ -85,7 +93,10 @@ async def test_nothing_is_replaced_before_it_is_asked_for(run, folder):
 
 async def test_a_scenario_goes_with_a_world(run, folder):
     async with dialog(run) as pilot:
-        world, scenario = (pilot.app.screen.query_one(f"#export-{kind}", Checkbox) for kind in ("world", "scenario"))
+        world, scenario = (
+            pilot.app.screen.query_one(f"#export-{kind}", Checkbox)
+            for kind in ("world", "scenario")
+        )
         await pilot.click(world)
         await pilot.pause()
         assert not world.value and not scenario.value and "X" not in str(world.render())
@@ -159,7 +170,10 @@ async def test_why_messages_cannot_be_written_is_told(run, folder):
         await pilot.press("ctrl+s")
         await settled(pilot)
         # Drake makes the runs again, and the robot of this run cannot drive.
-        assert told(pilot).startswith("robot 'robot': expected wheels on both sides") and names(folder) == ()
+        assert (
+            told(pilot).startswith("robot 'robot': expected wheels on both sides")
+            and names(folder) == ()
+        )
 
 
 def test_messages_that_are_being_written_can_be_stopped(tmp_path, monkeypatch):

@@ -47,7 +47,10 @@ async def test_pausing_stepping_and_vetoing(run):
         assert "there is nothing to accept" in session.said()
         await session.press("down", "down", "v")
         assert session.asked() == [("veto", {"round": 2, "candidate": 3})]
-        assert "without B is vetoed: it will not be tried in any round; v again undoes that" in session.said()
+        assert (
+            "without B is vetoed: it will not be tried in any round; v again undoes that"
+            in session.said()
+        )
         run.write("vetoed", candidate=3, verdict="vetoed")
         await session.look()
         await session.press("v")
@@ -57,11 +60,18 @@ async def test_pausing_stepping_and_vetoing(run):
         assert "part A is dissimilar already" in said
         assert session.asked() == [("undo", {})]
         assert "part A is taken back. A new search begins from 11 models." in said
-        assert "It will not reduce to these 6 again, in any branch, unless you allow it: v on their row" in said
+        assert (
+            "It will not reduce to these 6 again, in any branch, unless you allow it: v on their row"
+            in said
+        )
         await session.press("u")
         assert session.asked() == []
         assert "the last undo is not done yet" in session.said()
-        run.write("command_refused", command=session.run.file.commands()[-1].id, why="there is nothing to take back")
+        run.write(
+            "command_refused",
+            command=session.run.file.commands()[-1].id,
+            why="there is nothing to take back",
+        )
         await session.look()
         assert "undo: not done, there is nothing to take back" in session.said()
 
@@ -78,7 +88,9 @@ async def test_a_and_x_decide_on_the_reduction_that_waits(run, key, kind):
 
 
 @pytest.mark.parametrize(
-    ("answer", "first"), [("a", ["accept"]), ("d", []), ("escape", None)], ids=["accept", "drop", "cancel"]
+    ("answer", "first"),
+    [("a", ["accept"]), ("d", []), ("escape", None)],
+    ids=["accept", "drop", "cancel"],
 )
 async def test_a_new_search_asks_first_what_becomes_of_the_reduction_that_waits(run, answer, first):
     fake_moments.waiting(run).hold()
@@ -88,7 +100,11 @@ async def test_a_new_search_asks_first_what_becomes_of_the_reduction_that_waits(
         assert "Part A shows f and waits for you (11 → 4 models)" in session.dialog()
         assert session.asked() == []
         await session.press(answer)
-        decided = [] if first is None else [*((kind, {"round": 1, "candidate": 0}) for kind in first), pin]
+        decided = (
+            []
+            if first is None
+            else [*((kind, {"round": 1, "candidate": 0}) for kind in first), pin]
+        )
         assert session.asked() == decided
         if answer == "d":
             run.write("pinned", models=[4])
@@ -111,7 +127,9 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         await session.press("slash", *"04", "enter")
         assert not world.aims
         assert session.asked() == [("pin", {"models": [4]})]
-        assert "pinned, so that it always stays: crate_04. A new search begins from" in session.said()
+        assert (
+            "pinned, so that it always stays: crate_04. A new search begins from" in session.said()
+        )
         await session.press("1")
         world.go_to("crate_00")
         # On the map it is the same list, with what is pointed at.
@@ -155,7 +173,9 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
 async def test_what_breaks_off_a_certificate_asks_before(run):
     fake_moments.certifying(run).hold()
     async with Attached(run, (80, 24)) as session:
-        assert "17 of about 30 to 400 runs" in str(session.screen.query_one("#round").border_subtitle)
+        assert "17 of about 30 to 400 runs" in str(
+            session.screen.query_one("#round").border_subtitle
+        )
         await session.press("p", "enter")
         assert isinstance(session.app.screen, Question)
         assert "aborts certificate 1 after 17 runs" in session.dialog()
@@ -230,7 +250,10 @@ async def test_a_finished_run_goes_on_from_a_try(run, started):
     fake_moments.finished(run)
     async with Attached(run) as session:
         await session.press("r", "space", "s")
-        assert session.said().count("the run is finished; u, h, f, c, p, w and o continue from here") == 3
+        assert (
+            session.said().count("the run is finished; u, h, f, c, p, w and o continue from here")
+            == 3
+        )
         await session.press("w", *"01", "enter")
         assert session.asked() == [("try", {"models": [0]})]
         assert len(started) == 1
@@ -240,14 +263,21 @@ async def test_one_key_leaves_out_the_model_that_only_helps(run, started):
     fake_moments.helped(run)
     async with Attached(run) as session:
         assert "Minimal but for crate_01" in session.text("#happening")
-        assert "crate_01 only helps: press H to leave it out" in " ".join(session.text("#happening").split())
+        assert "crate_01 only helps: press H to leave it out" in " ".join(
+            session.text("#happening").split()
+        )
         await session.press("H")
         assert session.asked() == [("leave_out", {"model": 1})]
-        assert "crate_01 is left out. A new search begins from 1 model; an engine starts for it" in session.said()
+        assert (
+            "crate_01 is left out. A new search begins from 1 model; an engine starts for it"
+            in session.said()
+        )
         run.hold()
         run.write("engine_started", pid=2, jobs=2, version="0", simulator="none")
         fresh = next(
-            test for test in run.state.confirm_tests if test.without == "crate_01" and test.outcome == "similar"
+            test
+            for test in run.state.confirm_tests
+            if test.without == "crate_01" and test.outcome == "similar"
         )
         run.write("left_out", without=1, environment=[0], evidence_test=fresh.id, by_user=True)
         await session.look()
@@ -270,7 +300,10 @@ async def test_a_list_of_models_brings_the_map_to_a_small_terminal(run):
 @pytest.mark.parametrize(
     ("make", "why"),
     [
-        (fake_moments.isolating, "I works once the search for a world that passes is over; i stops it"),
+        (
+            fake_moments.isolating,
+            "I works once the search for a world that passes is over; i stops it",
+        ),
         (fake_moments.mid_round, "I works once the reduction is over"),
     ],
 )

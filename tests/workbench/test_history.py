@@ -18,7 +18,10 @@ from ddenv.workbench.widgets.question import Question
 
 def tree(*parents, here=0):
     """The lines of a tree given by each node's parent, with the nodes' numbers."""
-    nodes = [Node(number=number, parent=parent, how="reduced", what="", environment=()) for number, parent in enumerate((None, *parents))]
+    nodes = [
+        Node(number=number, parent=parent, how="reduced", what="", environment=())
+        for number, parent in enumerate((None, *parents))
+    ]
     return [f"{row.lines}{row.node.number}" for row in branches.rows(nodes, here)]
 
 
@@ -34,12 +37,16 @@ def test_the_way_to_where_the_run_is_goes_straight_down():
 
 def test_what_a_node_is_has_a_sign_words_and_tests_of_its_own(run):
     state = fold(fake_moments.guided(run).file.events())
-    told = [(branches.sign(node, state.node), branches.words(node, state.node)) for node in state.nodes]
+    told = [
+        (branches.sign(node, state.node), branches.words(node, state.node)) for node in state.nodes
+    ]
     assert told == [("○", ""), ("○", ""), ("✗", "taken back"), ("●", "here")]
     # The test of the reduction that was taken back is not the last one's own.
     assert [node.own_tests for node in state.nodes] == [0, 5, 6, 6]
     assert state.nodes[-1].tests == 7
-    state = fold(fake_moments.finished(fake_run.FakeRun(run.path.with_name("other.ddenv"))).file.events())
+    state = fold(
+        fake_moments.finished(fake_run.FakeRun(run.path.with_name("other.ddenv"))).file.events()
+    )
     assert branches.words(state.nodes[-1], 0) == "minimal"
     assert branches.words(replace(state.nodes[-1], rejected=True), 0) == "was minimal"
 
@@ -55,7 +62,12 @@ async def test_the_history_follows_the_run_and_compares(run):
         await session.press("h")
         history = session.app.screen
         assert isinstance(history, History)
-        assert [row[0] for row in cells(session)] == ["○ 11 models", "○ 6 models", "├─✗ 4 models", "● 5 models"]
+        assert [row[0] for row in cells(session)] == [
+            "○ 11 models",
+            "○ 6 models",
+            "├─✗ 4 models",
+            "● 5 models",
+        ]
         assert [row[4] for row in cells(session)] == ["3 of 4", "1 of 1", "1 of 1", "1 of 1"]
         assert [row[5] for row in cells(session)] == ["", "", "taken back", "here"]
         assert history.under_cursor.number == 3
@@ -68,10 +80,16 @@ async def test_the_history_follows_the_run_and_compares(run):
         assert "this is the marked one" in session.said()
         await session.press("up", "c")
         assert isinstance(session.app.screen, SideBySide)
-        first, second = session.screen.snapshot.state.nodes[3], session.screen.snapshot.state.nodes[2]
+        first, second = (
+            session.screen.snapshot.state.nodes[3],
+            session.screen.snapshot.state.nodes[2],
+        )
         told = {name: sides for name, *sides in lines(first, second, 3)}
         assert told["only in this one"] == ["2: crate_02, crate_03", "1: crate_05"]
-        assert told["in both"][0] == "3: crate_00, crate_01, crate_04" and told["own tests"] == ["6", "6"]
+        assert told["in both"][0] == "3: crate_00, crate_01, crate_04" and told["own tests"] == [
+            "6",
+            "6",
+        ]
         await session.press("escape")
         run.start_round(2, run.elements[:5])
         run.reduce(0, run.elements[:2], run.similar(0))

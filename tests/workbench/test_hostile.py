@@ -47,11 +47,15 @@ STEERING = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 
 def steering(app):
     """The lines of the screen that would steer a terminal, or are not as wide as it."""
-    lines = ["".join(segment.text for segment in strip) for strip in app.screen._compositor.render_strips()]
+    lines = [
+        "".join(segment.text for segment in strip)
+        for strip in app.screen._compositor.render_strips()
+    ]
     return [
         line
         for line in lines
-        if cell_len(line) != app.size.width or any(unicodedata.category(char) in STEERING for char in line)
+        if cell_len(line) != app.size.width
+        or any(unicodedata.category(char) in STEERING for char in line)
     ]
 
 
@@ -61,7 +65,9 @@ async def test_no_name_steers_the_terminal(runs, size):
     data = fake_run.scenario(name="evil \x1b]0;title\x07 [bold]\u202e")
     data["description"] = "\x1b[31m\u202e\n[red]"
     run = fake_run.FakeRun(
-        runs / "ev[il]\u202e-1.ddenv", data, fake_run.world_text([html.escape(name) for name in NAMES])
+        runs / "ev[il]\u202e-1.ddenv",
+        data,
+        fake_run.world_text([html.escape(name) for name in NAMES]),
     )
     fake_moments.guided(run)
     run.hold()
@@ -93,8 +99,18 @@ def test_a_run_is_made_once_and_rounds_go_on(run):
         state = apply(state, event)
     assert state.waiting_candidate is None
     made = {"scenario": run.data, "elements": ["other"]}
-    again = {"round": 2, "n_partitions": 2, "environment": 0, "partitions": [[0], [1]], "candidates": []}
-    for kind, data in (("created", made), ("round_started", again), ("accept_mode_changed", {"mode": "\x1b"})):
+    again = {
+        "round": 2,
+        "n_partitions": 2,
+        "environment": 0,
+        "partitions": [[0], [1]],
+        "candidates": [],
+    }
+    for kind, data in (
+        ("created", made),
+        ("round_started", again),
+        ("accept_mode_changed", {"mode": "\x1b"}),
+    ):
         with pytest.raises(UserError, match=rf"event 99 \({kind}\)"):
             apply(state, recorded(99, 0.0, kind, json.dumps(data)))
 
@@ -204,7 +220,10 @@ def test_stderr_may_be_a_file_if_the_output_is_a_terminal(monkeypatch, tmp_path)
     monkeypatch.delenv("TEXTUAL_DRIVER", raising=False)
     monkeypatch.setenv("TERM", "xterm")
     raw = os.fdopen(terminal, "w+b", 0)
-    with io.TextIOWrapper(raw, encoding="utf-8") as shown, (tmp_path / "log").open("w", encoding="utf-8") as errors:
+    with (
+        io.TextIOWrapper(raw, encoding="utf-8") as shown,
+        (tmp_path / "log").open("w", encoding="utf-8") as errors,
+    ):
         monkeypatch.setattr(sys, "__stdin__", shown)
         monkeypatch.setattr(sys, "__stdout__", shown)
         monkeypatch.setattr(sys, "__stderr__", errors)

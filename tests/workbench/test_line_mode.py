@@ -42,7 +42,8 @@ def test_it_begins_with_where_the_run_is_and_goes_on_with_what_happens(run):
 
 
 @pytest.mark.parametrize(
-    "moment", [fake_moments.mid_round, fake_moments.certifying, fake_moments.finished, fake_moments.guided]
+    "moment",
+    [fake_moments.mid_round, fake_moments.certifying, fake_moments.finished, fake_moments.guided],
 )
 def test_every_question_has_an_answer_at_any_time(run, moment):
     moment(run)
@@ -62,10 +63,28 @@ def test_typed_words_and_the_keys_of_the_screen_guide_the_run(run):
     fake_moments.waiting(run).hold()
     assert "part A is accepted" in said(run, "a")
     assert commands(run) == [("accept", {"round": 1, "candidate": 0})]
-    words = said(run, "veto part C", "p crate_07, crate_08", "yes", "pin nobody", "veto part Z", "veto", "dance", "pin")
-    assert commands(run)[1:] == [("veto", {"round": 1, "candidate": 4}), ("pin", {"models": [7, 8]})]
+    words = said(
+        run,
+        "veto part C",
+        "p crate_07, crate_08",
+        "yes",
+        "pin nobody",
+        "veto part Z",
+        "veto",
+        "dance",
+        "pin",
+    )
+    assert commands(run)[1:] == [
+        ("veto", {"round": 1, "candidate": 4}),
+        ("pin", {"models": [7, 8]}),
+    ]
     assert "Part A shows f and waits for you (11 → 4 models)" in words
-    for why in ("no model 'nobody'", "no 'part Z' in this round", "no command 'dance'", "pin: which models?"):
+    for why in (
+        "no model 'nobody'",
+        "no 'part Z' in this round",
+        "no command 'dance'",
+        "pin: which models?",
+    ):
         assert why in words
 
 
@@ -92,6 +111,8 @@ def test_every_action_that_guides_a_run_can_be_typed_with_its_key(run):
 def test_the_program_ends_with_the_run_when_nothing_more_can_be_typed(run):
     fake_moments.finished(run)
     words = [sys.executable, "-m", "ddenv", "open", str(run.path), "--lines"]
-    done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True
+    )
     assert done.stderr == ""
     assert "finished · round 3, n 2 · 2 of 11 models · 83 tests" in done.stdout

@@ -27,15 +27,26 @@ def test_what_a_means_for_a_try(run):
     assert "lacks crate_00, which is pinned" in why_not("accept", state, state.trials[2])
     run.write("unpinned", models=[0])
     now = Situation(run.state)
-    assert [offer("accept", now, Pointed(row)).words for row in now.state.trials] == ["", "count as f", "adopt"]
+    assert [offer("accept", now, Pointed(row)).words for row in now.state.trials] == [
+        "",
+        "count as f",
+        "adopt",
+    ]
     # From anywhere it adopts the last try that shows f.
-    assert meant("accept", run.state) == meant("accept", run.state, run.state.trials[2]) == ("adopt", {"trial": 3})
+    assert (
+        meant("accept", run.state)
+        == meant("accept", run.state, run.state.trials[2])
+        == ("adopt", {"trial": 3})
+    )
 
 
 def test_the_nearest_other_failure_is_the_one_to_accept(run):
     run.created().baseline()
     run.start_round(2)
-    tests = [run.test(0, "other", away, number, "tipped over") for number, away in enumerate((2.0, 0.5, 3.0))]
+    tests = [
+        run.test(0, "other", away, number, "tipped over")
+        for number, away in enumerate((2.0, 0.5, 3.0))
+    ]
     state = run.state
     assert meant("accept", state, state.round.candidates[0]) == ("accept_other", {"test": tests[1]})
 

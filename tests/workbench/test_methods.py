@@ -23,7 +23,9 @@ def test_what_is_not_installed_is_said_to_be_so():
 @pytest.mark.parametrize("algorithm", [*names("algorithm"), "theirs"])
 def test_each_part_of_the_pair_is_used_or_said_not_to_be(algorithm):
     for kind in ("partitioning", "prioritization"):
-        assert (kind in uses(algorithm)) != note(kind, algorithm).startswith(f"Not used by {algorithm}")
+        assert (kind in uses(algorithm)) != note(kind, algorithm).startswith(
+            f"Not used by {algorithm}"
+        )
 
 
 def test_the_labels_get_shorter():

@@ -65,7 +65,9 @@ def test_the_path_of_f_itself_comes_with_the_snapshot(run, poll):
 
 
 @pytest.mark.parametrize("becomes", ["deleted", "replaced"])
-def test_a_file_that_is_gone_is_told_and_neither_made_again_nor_another_one_touched(run, runs, poll, becomes):
+def test_a_file_that_is_gone_is_told_and_neither_made_again_nor_another_one_touched(
+    run, runs, poll, becomes
+):
     before = look(poll)
     run.close()
     for path in runs.glob("crates-1*"):
@@ -155,7 +157,9 @@ async def test_commands_are_sent_in_order_and_answered_on_the_screens_thread(run
     async with Attached(run) as session:
         answers = []
         for command in (Pause(), Resume(), Stop()):
-            session.screen.asking.send(command, then=lambda: answers.append(threading.current_thread()))
+            session.screen.asking.send(
+                command, then=lambda: answers.append(threading.current_thread())
+            )
         await eventually(lambda: len(answers) == 3)
         assert set(answers) == {threading.current_thread()}
         assert [kind for kind, _ in session.asked()] == ["pause", "resume", "stop"]

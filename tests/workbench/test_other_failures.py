@@ -19,7 +19,10 @@ async def test_another_failure_is_accepted_after_a_question(run):
         await session.press("a")
         assert isinstance(session.app.screen, Question)
         words = " ".join(session.dialog().split())
-        assert "In part A (3 models) the robot tipped over at (2.00, 0.40, 0.20) m, 2.30 m from f's end." in words
+        assert (
+            "In part A (3 models) the robot tipped over at (2.00, 0.40, 0.20) m, 2.30 m from f's end."
+            in words
+        )
         assert "In f it got stuck at (2.00, 0.40, 0.20) m." in words
         await session.press("n")
         assert session.asked() == []
@@ -34,7 +37,9 @@ async def test_a_branch_reduces_another_failure(run):
         dialog = session.app.screen
         met = atlas(run.state)
         assert met[0].name in str(dialog.query_one(OptionList).get_option_at_index(0).prompt)
-        assert f"{met[0].size} models (test {met[0].smallest})" in str(dialog.query_one(OptionList).options[0].prompt)
+        assert f"{met[0].size} models (test {met[0].smallest})" in str(
+            dialog.query_one(OptionList).options[0].prompt
+        )
         await session.press("enter")
         assert isinstance(session.app.screen, Question)
         words = " ".join(session.dialog().split())

@@ -59,7 +59,10 @@ async def test_the_cursor_follows_the_run_until_it_is_moved(run):
             await session.pilot.pause()
             small = session.screen.query_one("#small")
             assert small.display == (size[0] < 64)
-            assert not small.display or f"needs 64 x 18; this terminal has {size[0]} x {size[1]}" in str(small.render())
+            assert (
+                not small.display
+                or f"needs 64 x 18; this terminal has {size[0]} x {size[1]}" in str(small.render())
+            )
         assert len(table.columns) == 6
 
 
@@ -103,7 +106,11 @@ async def test_keys_that_only_look(run):
         assert type(session.app.screen).__name__ == "ExportScreen"
         await session.press("escape", "question_mark")
         assert isinstance(session.app.screen, Help)
-        words = {(shortcut.keys, shortcut.words) for group in session.app.screen.groups for shortcut in group.shortcuts}
+        words = {
+            (shortcut.keys, shortcut.words)
+            for group in session.app.screen.groups
+            for shortcut in group.shortcuts
+        }
         keys = {key for each, _ in words for key in each.split()}
         assert keys >= {*"?+-012345/acdeghlmopqrstuvwxy", "space", "shift+s", "shift+r"}
         await session.press("escape", "R")
@@ -147,7 +154,17 @@ async def test_small_terminals_show_one_pane_at_a_time_and_keys_go_through_them(
         await session.press("v")
         assert "2 shows the table" in session.said()
         footer = [key.words for key in session.screen.query_one(KeyFooter).entries]
-        assert footer == ["pause", "step", "pins", "try without", "undo", "history", "export", "help", "quit"]
+        assert footer == [
+            "pause",
+            "step",
+            "pins",
+            "try without",
+            "undo",
+            "history",
+            "export",
+            "help",
+            "quit",
+        ]
         await session.pilot.resize_terminal(200, 60)
         await session.pilot.pause()
         more = ("#models", "#decisions", *panes)
@@ -181,7 +198,11 @@ async def test_e_explains_the_method_of_the_run(runs):
         assert isinstance(session.app.screen, Method)
         static = session.app.screen.query_one(Static)
         words = " ".join(told(session.app.screen).split())
-        chosen = {"algorithm": "splitting", "partitioning": "model2model", "prioritization": "failure-proximal"}
+        chosen = {
+            "algorithm": "splitting",
+            "partitioning": "model2model",
+            "prioritization": "failure-proximal",
+        }
         for kind, name in chosen.items():
             assert f"{kind} {name}" in words
             assert " ".join(explanation(kind, name).split()) in words
@@ -236,7 +257,9 @@ async def test_space_or_r_starts_the_engine_of_a_run_that_has_none(run, started)
 
 
 async def test_an_engine_that_ends_at_once_is_told_with_its_log(run, monkeypatch):
-    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_, **__: SimpleNamespace(poll=lambda: 3))
+    monkeypatch.setattr(
+        "ddenv.runs.programs.start_engine", lambda *_, **__: SimpleNamespace(poll=lambda: 3)
+    )
     fake_moments.mid_round(run)
     run.path.with_name("crates-1.ddenv.log").write_text(
         "ddenv engine: started\nModuleNotFoundError: No module named 'x'\n"
@@ -249,7 +272,9 @@ async def test_an_engine_that_ends_at_once_is_told_with_its_log(run, monkeypatch
 
 def scene_program(code):
     words = [sys.executable, "-c", code]
-    return lambda run: subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    return lambda run: subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
 
 
 async def test_m_shows_where_the_scene_is_and_the_scene_ends_with_the_workbench(run, monkeypatch):
@@ -274,7 +299,11 @@ async def test_m_shows_where_the_scene_is_and_the_scene_ends_with_the_workbench(
         await session.press("escape")
         await session.look()
         assert URL in session.text("#status")
-        assert any(span.style.link == URL for span in session.screen.query_one("#status").render().spans if span.style)
+        assert any(
+            span.style.link == URL
+            for span in session.screen.query_one("#status").render().spans
+            if span.style
+        )
         process = session.screen.scene._process
         await session.press("m", "x")
         assert process.poll() is not None
@@ -307,7 +336,9 @@ async def test_a_damaged_run_is_told_and_nothing_breaks(run):
         assert session.commands() == []
 
 
-@pytest.mark.parametrize("pose", ['"x"', "[1, 2]", "{}", "[null, 0, 0, 1, 0, 0, 0]", "[NaN, 0, 0, 1, 0, 0, 0]"])
+@pytest.mark.parametrize(
+    "pose", ['"x"', "[1, 2]", "{}", "[null, 0, 0, 1, 0, 0, 0]", "[NaN, 0, 0, 1, 0, 0, 0]"]
+)
 def test_live_poses_that_make_no_sense_do_no_harm(run, pose):
     fake_moments.mid_round(run).hold()
     run.file._db.execute("UPDATE live SET pose = ?", (pose,))
@@ -342,7 +373,10 @@ async def test_names_are_text_and_never_markup(runs):
         assert "[bold]x[/]" in session.text("#happening")
         assert "[link=file:///]y" in session.text("#happening")
         assert "[red]crates[/]" in session.text("#header")
-        shown = [strip.text for strip in map(session.screen.query_one("#models", Lines).render_line, range(11))]
+        shown = [
+            strip.text
+            for strip in map(session.screen.query_one("#models", Lines).render_line, range(11))
+        ]
         assert any("[bold]x[/]" in line for line in shown)
         assert "[bold]x[/]" in session.screen.query_one("#decisions", Lines).render_line(0).text
         await session.press("w", *"[bo", "tab", "enter")
@@ -354,7 +388,9 @@ async def test_all_that_a_key_changes_is_drawn_at_once(run):
     fake_moments.uncertified(run)
     async with Attached(run) as session:
         drawn, display = [], session.app._display
-        session.app._display = lambda screen, update: drawn.append(update) or display(screen, update)
+        session.app._display = lambda screen, update: (
+            drawn.append(update) or display(screen, update)
+        )
         for key in ("down", "up", "tab", "shift+tab"):
             await asyncio.sleep(0.1)
             await session.pilot.pause()
@@ -376,5 +412,8 @@ async def test_the_footer_keeps_to_its_width(run):
             assert len(footer.render().plain) <= width
             # What comes next, and nothing that is left to be stepped, accepted or vetoed.
             shown = [key.words for key in footer.entries]
-            assert shown[:3] == ["why", "world that passes", "export"] and shown[-2:] == ["quit", "help"]
+            assert shown[:3] == ["why", "world that passes", "export"] and shown[-2:] == [
+                "quit",
+                "help",
+            ]
             assert not {*shown} & {"pause", "step", "accept", "reject", "veto"}

@@ -92,7 +92,9 @@ def test_run_screen(snap_compare, run, theme, size):
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[SMALL]), ids=str)
-@pytest.mark.parametrize("moment", slow(pytest.mark.screens, MOMENTS, but=[fake_moments.waiting]), ids=by_name)
+@pytest.mark.parametrize(
+    "moment", slow(pytest.mark.screens, MOMENTS, but=[fake_moments.waiting]), ids=by_name
+)
 def test_moments_of_a_run(snap_compare, run, moment, size):
     moment(run)
     if moment not in (fake_moments.finished, fake_moments.not_shown):
@@ -103,7 +105,9 @@ def test_moments_of_a_run(snap_compare, run, moment, size):
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[SMALL]), ids=str)
 def test_what_a_candidate_drops(snap_compare, run, size):
     fake_moments.piled(run).hold()
-    assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown("ddenv", "down", "down"))
+    assert snap_compare(
+        Workbench(run.path), terminal_size=size, run_before=shown("ddenv", "down", "down")
+    )
 
 
 @pytest.mark.screens
@@ -152,16 +156,22 @@ OPENED = {
 )
 def test_what_a_key_opens(snap_compare, run, name, theme, size):
     fake_moments.guided(run).hold()
-    assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown(theme, *OPENED[name]))
+    assert snap_compare(
+        Workbench(run.path), terminal_size=size, run_before=shown(theme, *OPENED[name])
+    )
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[USUAL]), ids=str)
 @pytest.mark.parametrize(
-    "keys", slow(pytest.mark.screens, [(), ("enter", *["right"] * 20)], but=[()]), ids=["why", "both"]
+    "keys",
+    slow(pytest.mark.screens, [(), ("enter", *["right"] * 20)], but=[()]),
+    ids=["why", "both"],
 )
 def test_why_it_fails(snap_compare, run, keys, size):
     fake_moments.faster_without(run).write("paused")
-    assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown("ddenv", "W", *keys))
+    assert snap_compare(
+        Workbench(run.path), terminal_size=size, run_before=shown("ddenv", "W", *keys)
+    )
 
 
 @pytest.mark.screens
@@ -176,7 +186,9 @@ def test_both_runs_in_no_colour(snap_compare, run, monkeypatch):
 @pytest.mark.parametrize("name", ["history", "compare", "runs"])
 def test_what_a_key_opens_where_there_is_room(snap_compare, run, name):
     fake_moments.guided(run).hold()
-    assert snap_compare(Workbench(run.path), terminal_size=LARGE, run_before=shown("ddenv", *OPENED[name]))
+    assert snap_compare(
+        Workbench(run.path), terminal_size=LARGE, run_before=shown("ddenv", *OPENED[name])
+    )
 
 
 @pytest.mark.screens
@@ -205,7 +217,9 @@ def test_panes_of_the_setup_screen(snap_compare, scenarios, pane):
 def test_missing_files(snap_compare, scenarios, size, keys):
     world = scenarios / "crates.sdf"
     names = ("jersey_barrier", "old_shelf", "construction_cone")
-    missing = "".join(f"<include><uri>model://{name}</uri><pose>3 -4 0 0 0 0</pose></include>" for name in names)
+    missing = "".join(
+        f"<include><uri>model://{name}</uri><pose>3 -4 0 0 0 0</pose></include>" for name in names
+    )
     world.write_text(world.read_text().replace("</world>", f"{missing}</world>"))
     assert snap_compare(Workbench(), terminal_size=size, run_before=shown("ddenv", *keys))
 

@@ -16,7 +16,12 @@ from ddenv.workbench.run.status import Header, Status, branch_of, facts, fitted,
 
 
 def snapshot(run, engine="alive", **changes) -> Snapshot:
-    return Snapshot(state=fold(run.file.events()).changed(**changes), live=tuple(run.file.live()), engine=engine, spent=83)
+    return Snapshot(
+        state=fold(run.file.events()).changed(**changes),
+        live=tuple(run.file.live()),
+        engine=engine,
+        spent=83,
+    )
 
 
 def mid_round(run) -> Snapshot:
@@ -32,11 +37,26 @@ def said(shown, width=200, **more):
 
 def test_everything_is_said_where_there_is_room(run):
     told = said(mid_round(run), 260, scene="http://127.0.0.1:7000/static/", asked="pause")
-    assert list(told) == ["state", "asked", "tests", "drift", "cut", "time", "left", "mode", "engine", "scene"]
+    assert list(told) == [
+        "state",
+        "asked",
+        "tests",
+        "drift",
+        "cut",
+        "time",
+        "left",
+        "mode",
+        "engine",
+        "scene",
+    ]
     assert told["drift"] == "f in 1 of 1 here, 3 of 4 in the whole world"
     assert told["state"] == "▶ running"
     assert told["tests"] == "10 tests: 4 similar 4 pass 2 other"
-    assert (told["cut"], told["time"], told["engine"]) == ("3 ended early", "1 min 23 s", "engine ●")
+    assert (told["cut"], told["time"], told["engine"]) == (
+        "3 ended early",
+        "1 min 23 s",
+        "engine ●",
+    )
     assert told["left"].startswith("about ")
     assert " (" in told["left"]
 
@@ -73,7 +93,9 @@ def test_the_least_important_goes_first(run, width):
 def test_of_a_paused_run_the_tests_are_told_that_are_left(run):
     fake_moments.mid_round(run).write("paused")
     assert said(snapshot(run))["left"].split(" (")[0].endswith("tests left")
-    assert "left" not in said(snapshot(fake_moments.finished(fake_run.FakeRun(run.path.with_name("b.ddenv")))))
+    assert "left" not in said(
+        snapshot(fake_moments.finished(fake_run.FakeRun(run.path.with_name("b.ddenv"))))
+    )
 
 
 def test_a_budget_is_told_with_the_tests(run):
@@ -87,21 +109,42 @@ def test_an_engine_that_is_gone_or_of_another_version_is_told(run):
     fake_moments.mid_round(run)
     assert said(snapshot(run, "absent"))["state"] == "✗ engine is gone: r resumes"
     assert said(snapshot(run, engine_version=__version__))["engine"] == "engine ●"
-    assert said(snapshot(run, engine_version="0.0.9"))["engine"] == f"engine ● 0.0.9, not {__version__}"
-    assert said(snapshot(run, engine_version="99.0"))["engine"] == f"engine ● 99.0, not {__version__}"
+    assert (
+        said(snapshot(run, engine_version="0.0.9"))["engine"]
+        == f"engine ● 0.0.9, not {__version__}"
+    )
+    assert (
+        said(snapshot(run, engine_version="99.0"))["engine"] == f"engine ● 99.0, not {__version__}"
+    )
     assert said(snapshot(run, "absent", status="stopped"))["engine"] == "engine ○ off: r resumes"
     assert said(replace(snapshot(run, "absent"), gone=True))["state"] == "✗ the run file is gone"
 
 
 def nodes(*parents, rejected=()):
-    return tuple(Node(number=number, parent=parent, how="", what="", environment=(), rejected=number in rejected) for number, parent in enumerate(parents))
+    return tuple(
+        Node(
+            number=number,
+            parent=parent,
+            how="",
+            what="",
+            environment=(),
+            rejected=number in rejected,
+        )
+        for number, parent in enumerate(parents)
+    )
 
 
 def test_a_branch_is_told_unless_it_is_the_newest(run):
     # 0 - 1 - 2, and from 1 later 3 - 4.
     tree = nodes(None, 0, 1, 1, 3)
     state = snapshot(fake_moments.mid_round(run)).state
-    assert [branch_of(state.changed(nodes=tree, node=node)) for node in range(5)] == [None, None, 1, None, None]
+    assert [branch_of(state.changed(nodes=tree, node=node)) for node in range(5)] == [
+        None,
+        None,
+        1,
+        None,
+        None,
+    ]
     undone = nodes(None, 0, 1, rejected={2})
     assert branch_of(state.changed(nodes=undone, node=1)) is None
     assert heading(state.changed(nodes=tree, node=2))[1][0].startswith("branch 1 · round 2")
@@ -117,7 +160,9 @@ class Lines(App):
 
 @pytest.mark.parametrize("width", [20, 64, 80, 120])
 async def test_lines_fit_and_are_drawn_only_when_they_changed(run, width, monkeypatch):
-    shown = snapshot(fake_moments.mid_round(run), pinned=frozenset({"crate_00"}), nodes=nodes(None, 0, 0), node=1)
+    shown = snapshot(
+        fake_moments.mid_round(run), pinned=frozenset({"crate_00"}), nodes=nodes(None, 0, 0), node=1
+    )
     async with (app := Lines()).run_test(size=(width, 4)) as pilot:
         header, status = app.query_one(Header), app.query_one(Status)
         header.show(shown)

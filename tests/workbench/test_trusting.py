@@ -21,7 +21,9 @@ from tests.workbench.setup.setup_session import Opened
 def brings(scenarios):
     """The scenario file, which now brings a controller along."""
     path = scenarios / "crates.yaml"
-    path.write_text(yaml.safe_dump(fake_run.scenario() | {"controller": {"use": "subprocess:Popen"}}))
+    path.write_text(
+        yaml.safe_dump(fake_run.scenario() | {"controller": {"use": "subprocess:Popen"}})
+    )
     return path
 
 
@@ -58,7 +60,10 @@ async def test_an_ended_run_that_was_sent_asks_before_it_goes_on(run, started):
         ((text,),) = database.execute("SELECT content FROM document WHERE name = 'scenario'")
         scenario = json.loads(text)
         scenario["controller"] = {"use": "subprocess:Popen"}
-        database.execute("UPDATE document SET content = ? WHERE name = 'scenario'", [json.dumps(scenario).encode()])
+        database.execute(
+            "UPDATE document SET content = ? WHERE name = 'scenario'",
+            [json.dumps(scenario).encode()],
+        )
     async with Attached(run) as session:
         await session.press("p", *"00", "enter")
         assert "crates-1.ddenv starts the controller subprocess:Popen" in question(session.app)

@@ -27,8 +27,14 @@ WORDS = (
     # In a table they are short.
     (brief, {0.42: "0.4 s", 9.96: "10 s", 312: "312 s", 1500: "25 min", 40_000: "11 h"}),
     # What is not known exactly is rounded.
-    (lambda times: about(*times), {(8.1, 4.2, 22): "8 s (4 to 20)", (122, 61, 301): "2 min (1 to 5)"}),
-    (lambda times: about(*times), {(1,): "1 s", (9000, 3000, 40_000): "2 h (1 to 10)", (0, 0, 0): "1 s"}),
+    (
+        lambda times: about(*times),
+        {(8.1, 4.2, 22): "8 s (4 to 20)", (122, 61, 301): "2 min (1 to 5)"},
+    ),
+    (
+        lambda times: about(*times),
+        {(1,): "1 s", (9000, 3000, 40_000): "2 h (1 to 10)", (0, 0, 0): "1 s"},
+    ),
     # Percentages are never rounded to certainty.
     (percent, {0: "0 %", 0.001: "<1 %", 0.5: "50 %", 0.999: ">99 %", 1: "100 %"}),
     (metres, {None: "", "x": "", float("nan"): "", float("inf"): ""}),
@@ -49,8 +55,15 @@ def looks_of(run, candidate=None):
     state = fold(run.file.events())
     prints = footprints(parse_world(run.world, Path("w.sdf")))
     chosen = state.round.candidates[candidate] if candidate is not None else None
-    how = looks(prints, kept(Shown(snapshot=Snapshot(state=state), candidate=chosen)), mixed((0, 0, 0), (255, 255, 255)))
-    return {each.name: (kind, label) for each, kind, label in zip(prints, how.kinds, how.signs.texts, strict=True)}
+    how = looks(
+        prints,
+        kept(Shown(snapshot=Snapshot(state=state), candidate=chosen)),
+        mixed((0, 0, 0), (255, 255, 255)),
+    )
+    return {
+        each.name: (kind, label)
+        for each, kind, label in zip(prints, how.kinds, how.signs.texts, strict=True)
+    }
 
 
 def test_kept_models_carry_the_letter_of_their_part_and_removed_ones_none(run, runs):

@@ -27,7 +27,9 @@ def model(inside: str, name: str = "m") -> bytes:
 
 
 def shape(inside: str) -> bytes:
-    return model(f"<link name='l'><collision name='c'><geometry>{inside}</geometry></collision></link>")
+    return model(
+        f"<link name='l'><collision name='c'><geometry>{inside}</geometry></collision></link>"
+    )
 
 
 def include(uri: str, more: str = "") -> str:

@@ -11,20 +11,131 @@ from hypothesis import strategies as st
 
 # What people and programs have written where a number, a name or a place was wanted.
 VALUES = (
-    *("nan", "inf", "-inf", "1e308", "-1e308", "1e-320", "1e400", "0", "-1", "-0", "1e16", "0.5", "true", "false", "2"),
-    *("", " ", "words", "0 0 0", "1 2 3", "nan nan nan", "0 0 0 0 0 0", "1 1 1 1 1 1", "1e6 1e6 1e6 1 1 1"),
+    *(
+        "nan",
+        "inf",
+        "-inf",
+        "1e308",
+        "-1e308",
+        "1e-320",
+        "1e400",
+        "0",
+        "-1",
+        "-0",
+        "1e16",
+        "0.5",
+        "true",
+        "false",
+        "2",
+    ),
+    *(
+        "",
+        " ",
+        "words",
+        "0 0 0",
+        "1 2 3",
+        "nan nan nan",
+        "0 0 0 0 0 0",
+        "1 1 1 1 1 1",
+        "1e6 1e6 1e6 1 1 1",
+    ),
     "1e-320 1 1",
-    *("9" * 400, "x" * 3000, "1 " * 500, "Бочка", "木", "\u202e", "a\tb", "'", '"', "]", "&<>", "٣", "1_000", "0x10"),
-    *("link", "world", "__model__", "a::b", "::", "rack", "rack::boards", "shelf", "foot", "mast", "hinge", "bed"),
-    *("barrel (old)", "barrel (old) #2", "grey wall", "crate 1", "corner", "handle", "post", "load::sack", "gone"),
-    *("../../../../etc/passwd", "%2e%2e/%2e%2e/%2e%2e/etc/passwd", "file:///etc/passwd", "file:///dev/zero"),
-    *("gazebo.world", "frames.world", "model://crate", "models/trolley", "model://crate/crate.obj", "model://..", "/"),
+    *(
+        "9" * 400,
+        "x" * 3000,
+        "1 " * 500,
+        "Бочка",
+        "木",
+        "\u202e",
+        "a\tb",
+        "'",
+        '"',
+        "]",
+        "&<>",
+        "٣",
+        "1_000",
+        "0x10",
+    ),
+    *(
+        "link",
+        "world",
+        "__model__",
+        "a::b",
+        "::",
+        "rack",
+        "rack::boards",
+        "shelf",
+        "foot",
+        "mast",
+        "hinge",
+        "bed",
+    ),
+    *(
+        "barrel (old)",
+        "barrel (old) #2",
+        "grey wall",
+        "crate 1",
+        "corner",
+        "handle",
+        "post",
+        "load::sack",
+        "gone",
+    ),
+    *(
+        "../../../../etc/passwd",
+        "%2e%2e/%2e%2e/%2e%2e/etc/passwd",
+        "file:///etc/passwd",
+        "file:///dev/zero",
+    ),
+    *(
+        "gazebo.world",
+        "frames.world",
+        "model://crate",
+        "models/trolley",
+        "model://crate/crate.obj",
+        "model://..",
+        "/",
+    ),
     *("revolute", "fixed", "ball", "universal", "screw", "quat_xyzw", "1.4", "1.6", "1.12", "9.9"),
 )
 TAGS = (
-    *("model", "link", "joint", "frame", "collision", "visual", "pose", "geometry", "box", "sphere"),
-    *("mesh", "polyline", "plane", "capsule", "heightmap", "empty", "inertial", "mass", "inertia", "ixx"),
-    *("scale", "state", "include", "uri", "name", "static", "axis", "axis2", "limit", "lower", "parent"),
+    *(
+        "model",
+        "link",
+        "joint",
+        "frame",
+        "collision",
+        "visual",
+        "pose",
+        "geometry",
+        "box",
+        "sphere",
+    ),
+    *(
+        "mesh",
+        "polyline",
+        "plane",
+        "capsule",
+        "heightmap",
+        "empty",
+        "inertial",
+        "mass",
+        "inertia",
+        "ixx",
+    ),
+    *(
+        "scale",
+        "state",
+        "include",
+        "uri",
+        "name",
+        "static",
+        "axis",
+        "axis2",
+        "limit",
+        "lower",
+        "parent",
+    ),
     *("child", "density", "population", "sdf", "world"),
 )
 ATTRIBUTES = (
@@ -84,7 +195,12 @@ def change_element(root: Element, step: Step) -> None:
 
 def change_place(root: Element, step: Step) -> None:
     """Changes of where an element is."""
-    pairs = [(parent, child) for parent in elements(root) for child in parent if isinstance(child.tag, str)]
+    pairs = [
+        (parent, child)
+        for parent in elements(root)
+        for child in parent
+        if isinstance(child.tag, str)
+    ]
     pairs = [pair for pair in pairs if step.kind != "wrap" or pair[1].tag == "model"]
     if not pairs:
         return
@@ -129,7 +245,9 @@ def change_chosen(root: Element, step: Step) -> None:
             words[step.second % len(words)] = step.value
             one.text = " ".join(words)
         case "name alike":
-            chosen([each for each in fitting if each.tag == one.tag], step.second).set("name", one.get("name"))
+            chosen([each for each in fitting if each.tag == one.tag], step.second).set(
+                "name", one.get("name")
+            )
         case "go in a circle":
             # A few frames or links of one model, each given relative to the next.
             things = [child for child in one if child.tag in ("frame", "link", "model", "joint")]
@@ -145,7 +263,9 @@ def change_chosen(root: Element, step: Step) -> None:
 
 
 CHANGES = {
-    **dict.fromkeys(("swap", "rename", "write an attribute", "add a child", "copy into"), change_element),
+    **dict.fromkeys(
+        ("swap", "rename", "write an attribute", "add a child", "copy into"), change_element
+    ),
     **dict.fromkeys(("delete", "duplicate", "move", "wrap"), change_place),
     **dict.fromkeys(("drop an attribute", "write text", "write one number"), change_chosen),
     **dict.fromkeys(("name alike", "go in a circle", "join anything"), change_chosen),

@@ -53,7 +53,9 @@ def read_or_refused(text: bytes, path: Path) -> None:
 def check_complaint(line: str, text: bytes, path: Path) -> None:
     assert line.isprintable(), line
     assert len(line) < 6000, line
-    file = next((one for one in (path, *DATA.rglob("*")) if re.match(re.escape(str(one)) + ":", line)), None)
+    file = next(
+        (one for one in (path, *DATA.rglob("*")) if re.match(re.escape(str(one)) + ":", line)), None
+    )
     assert file is not None, line
     said = line.removeprefix(str(file))
     if any(re.match(pattern, said) for pattern in OF_THE_FILE):
@@ -72,7 +74,9 @@ def check_world(world: World) -> None:
     ends = [0, *(place for span in spans for place in span), len(world.text)]
     assert ends == sorted(ends), spans
     for model in world.models:
-        for (start, end), tags in zip(model.spans, ((b"<model", b"<include"), (b"<model",)), strict=False):
+        for (start, end), tags in zip(
+            model.spans, ((b"<model", b"<include"), (b"<model",)), strict=False
+        ):
             assert world.text[start:end].startswith(tags), world.text[start:end]
             assert world.text[start:end].endswith(b">"), world.text[start:end]
         check_model(model)
@@ -151,13 +155,21 @@ def numbers_in(value: object) -> list[float]:
     if isinstance(value, tuple | list):
         return [number for each in value for number in numbers_in(each)]
     if dataclasses.is_dataclass(value):
-        return [number for field in dataclasses.fields(value) for number in numbers_in(getattr(value, field.name))]
+        return [
+            number
+            for field in dataclasses.fields(value)
+            for number in numbers_in(getattr(value, field.name))
+        ]
     return []
 
 
 def check_smaller_worlds(world: World) -> None:
     """Without any of its elements the world reads again, and all others are as they were."""
     names = world.elements()
-    for name in names if len(names) < 4 else (names[0], names[len(world.text) % len(names)], names[-1]):
+    for name in (
+        names if len(names) < 4 else (names[0], names[len(world.text) % len(names)], names[-1])
+    ):
         again = parse_world(without(world, frozenset([name])), world.path, READING)
-        assert [model.links for model in again.models] == [model.links for model in world.models if model.name != name]
+        assert [model.links for model in again.models] == [
+            model.links for model in world.models if model.name != name
+        ]

@@ -21,7 +21,14 @@ def test_words_are_split_as_a_shell_does_and_placeholders_filled(words, tmp_path
     found = words("./run.sh --world={world} '{seed} seeds' ; rm $HOME '{\"a\": 1}'")
     assert found[0] == str(tmp_path / "run.sh")
     values = {"world": "/a {seed}.sdf", "seed": "7", "log": "/l"}
-    assert filled(found, values)[1:] == ["--world=/a {seed}.sdf", "7 seeds", ";", "rm", "$HOME", '{"a": 1}']
+    assert filled(found, values)[1:] == [
+        "--world=/a {seed}.sdf",
+        "7 seeds",
+        ";",
+        "rm",
+        "$HOME",
+        '{"a": 1}',
+    ]
     assert has_placeholder(found, "seed")
     assert not has_placeholder(found, "log")
     assert words("sh -c true")[0].startswith("/")
@@ -30,7 +37,10 @@ def test_words_are_split_as_a_shell_does_and_placeholders_filled(words, tmp_path
 @pytest.mark.parametrize(
     ("command", "complaint"),
     [
-        ("./run.sh {wrld}", r"unknown placeholder \{wrld\} \(did you mean world\?\); use \{world\}, \{scenario\}, "),
+        (
+            "./run.sh {wrld}",
+            r"unknown placeholder \{wrld\} \(did you mean world\?\); use \{world\}, \{scenario\}, ",
+        ),
         ("./run.sh ${HOME}", r"unknown placeholder \{HOME\}"),
         ("./run.sh 'a", "no closing quotation"),
         (" ", "names no program"),
@@ -62,7 +72,8 @@ SCRIPTS = {
 def test_a_script_that_the_system_cannot_start_is_told(words, tmp_path, content, interpreter):
     (tmp_path / "run.sh").write_bytes(content)
     with pytest.raises(
-        UserError, match=f"^oracle.command: .*run.sh:1: there is no interpreter {interpreter}; its first "
+        UserError,
+        match=f"^oracle.command: .*run.sh:1: there is no interpreter {interpreter}; its first ",
     ):
         words("./run.sh")
 
@@ -86,7 +97,10 @@ def test_the_module_of_a_simulator_in_python_has_to_be_there_and_is_not_imported
         assert command_words(wall(folder=tmp_path, oracle=Oracle(use=use))) == ()
     run = tmp_path / "run.ddenv"
     for oracle, said in (
-        (Oracle(use="mime:Mine"), rf"module 'mime' in {tmp_path}, nor installed \(did you mean mine\?\)$"),
+        (
+            Oracle(use="mime:Mine"),
+            rf"module 'mime' in {tmp_path}, nor installed \(did you mean mine\?\)$",
+        ),
         (Oracle(use=".mine:Mine"), r"module '\.mine' in "),
         (Oracle(use="mine:Mine", folder=tmp_path / "no"), f"folder {tmp_path}/no to start the "),
     ):

@@ -46,7 +46,9 @@ def assert_same_in_drake(world, path):
 OWN = [DATA / "wall.sdf", SDF / "worlds" / "ditch.sdf"]
 
 
-@pytest.mark.parametrize("path", slow(pytest.mark.rates, OWN, but=OWN[:1]), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", slow(pytest.mark.rates, OWN, but=OWN[:1]), ids=lambda path: path.stem
+)
 def test_our_own_worlds(path, tmp_path):
     world = read_world(path)
     assert write_converted(world, tmp_path / "clean.sdf") == [tmp_path / "clean.sdf"]
@@ -60,7 +62,9 @@ def of_text(inside, tmp_path, version="1.6"):
 
 AXES = "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>"
 JOINTS = (
-    joint("prismatic", "<axis><xyz>0 1 0</xyz><limit><lower>-1</lower><upper>2</upper></limit></axis>")
+    joint(
+        "prismatic", "<axis><xyz>0 1 0</xyz><limit><lower>-1</lower><upper>2</upper></limit></axis>"
+    )
     + joint("ball", child="c", name="k")
     + "<link name='d'/>"
     + joint("universal", f"<pose>0 0 0 0.3 0.2 0.5</pose>{AXES}", "c", "d", "l")
@@ -89,7 +93,9 @@ def test_what_drake_refuses_in_the_original_is_written_so_that_it_loads(tmp_path
 
 
 def test_reading_what_was_written_gives_the_same_world(tmp_path):
-    world = of_text(f"<model name='m'><pose>1 2 3 0.1 0.2 0.3</pose>{LINKS}{JOINTS}</model>", tmp_path)
+    world = of_text(
+        f"<model name='m'><pose>1 2 3 0.1 0.2 0.3</pose>{LINKS}{JOINTS}</model>", tmp_path
+    )
     again = parse_world(convert(world, "meshes")[0], tmp_path / "clean.sdf")
     assert again.notes == ()
     for link, twin in zip(world.models[0].links, again.models[0].links, strict=True):

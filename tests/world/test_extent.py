@@ -5,8 +5,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.world.extent import bounds, center, corners, model_bounds, shape_bounds, with_ground_boxes
-from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Link, Mesh, Model, Plane, Sphere
+from ddenv.world.extent import (
+    bounds,
+    center,
+    corners,
+    model_bounds,
+    shape_bounds,
+    with_ground_boxes,
+)
+from ddenv.world.model import (
+    Box,
+    Capsule,
+    Collision,
+    Cylinder,
+    Ellipsoid,
+    Link,
+    Mesh,
+    Model,
+    Plane,
+    Sphere,
+)
 from ddenv.world.pose import Pose
 from ddenv.world.sdf.read import parse_world
 from tests.conftest import ROOT
@@ -43,11 +61,21 @@ def test_every_point_is_in_the_box_and_some_are_on_each_side(case, pose):
 
 
 def model(*collisions: Collision) -> Model:
-    return Model(name="m", pose=Pose((7, 8, 9)), static=True, links=(Link(name="l", pose=Pose(), inertia=None, collisions=collisions, visuals=()),), joints=(), spans=(), line=1)
+    return Model(
+        name="m",
+        pose=Pose((7, 8, 9)),
+        static=True,
+        links=(Link(name="l", pose=Pose(), inertia=None, collisions=collisions, visuals=()),),
+        joints=(),
+        spans=(),
+        line=1,
+    )
 
 
 def test_a_model_is_the_box_around_all_its_shapes_but_planes():
-    boxes = [Collision(name="c", shape=Box((1, 1, 1)), pose=Pose((x, 0, 0)), mu=1.0) for x in (0, 4)]
+    boxes = [
+        Collision(name="c", shape=Box((1, 1, 1)), pose=Pose((x, 0, 0)), mu=1.0) for x in (0, 4)
+    ]
     plane = Collision(name="p", shape=Plane((1, 1)), pose=Pose((90, 0, 0)), mu=1.0)
     low, high = model_bounds(model(*boxes, plane))
     assert (low.tolist(), high.tolist()) == ([-0.5, -0.5, -0.5], [4.5, 0.5, 0.5])
@@ -81,7 +109,9 @@ def test_its_top_is_the_plane():
     assert middle == pytest.approx((0, 0, -0.25))
 
 
-@pytest.mark.parametrize("places", [((300.0, 0.0),), ((0.0, 0.0), (-1000.0, 5000.0)), ((90.0, 0.0),)])
+@pytest.mark.parametrize(
+    "places", [((300.0, 0.0),), ((0.0, 0.0), (-1000.0, 5000.0)), ((90.0, 0.0),)]
+)
 def test_it_reaches_beyond_everything(places):
     made = with_ground_boxes(world(*places), corners(world(*places)), [(0.0, 150.0, 0.0)])
     (collision,) = made.model("g").collisions
@@ -89,5 +119,8 @@ def test_it_reaches_beyond_everything(places):
         local = collision.pose.inverse().rotate(
             tuple(a - b for a, b in zip((x, y, 0.0), collision.pose.position, strict=True))
         )
-        assert all(abs(part) + 20 < size / 2 for part, size in zip(local[:2], collision.shape.size[:2], strict=True))
+        assert all(
+            abs(part) + 20 < size / 2
+            for part, size in zip(local[:2], collision.shape.size[:2], strict=True)
+        )
     assert made.model("m0") == world(*places).model("m0")

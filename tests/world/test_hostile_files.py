@@ -57,10 +57,15 @@ def test_entities_are_refused_in_included_files_too(check, tmp_path, entity):
 
 
 @pytest.mark.parametrize("suffix", ["dae", "obj", "stl", "gltf", "glb"])
-@pytest.mark.parametrize("content", [b"", b"\0" * 200, b"v 0 0 0\nf 1 2 3\n", b"{" * 5000, b"<a>" * 5000, b"[1e999]"])
+@pytest.mark.parametrize(
+    "content", [b"", b"\0" * 200, b"v 0 0 0\nf 1 2 3\n", b"{" * 5000, b"<a>" * 5000, b"[1e999]"]
+)
 def test_a_mesh_that_is_none_is_refused_where_it_is_named(check, tmp_path, suffix, content):
     (tmp_path / f"mesh.{suffix}").write_bytes(content)
-    assert re.match(r":1: /sdf/world/\S+/mesh: ", refusal(*check(shape(f"<mesh><uri>mesh.{suffix}</uri></mesh>"))))
+    assert re.match(
+        r":1: /sdf/world/\S+/mesh: ",
+        refusal(*check(shape(f"<mesh><uri>mesh.{suffix}</uri></mesh>"))),
+    )
 
 
 def test_a_gigabyte_is_refused_at_once(tmp_path):
@@ -86,7 +91,9 @@ def test_a_folder_and_a_file_that_is_missing_are_refused(tmp_path, check_file, n
     assert words in refusal(check_file(tmp_path / name), tmp_path)
 
 
-@pytest.mark.parametrize("name", slow(pytest.mark.fuzz, ["/dev/zero", "/dev/null", "/dev/tty"], but=["/dev/zero"]))
+@pytest.mark.parametrize(
+    "name", slow(pytest.mark.fuzz, ["/dev/zero", "/dev/null", "/dev/tty"], but=["/dev/zero"])
+)
 def test_a_device_is_refused(name):
     refusal(check_bounded(name, seconds=AT_ONCE), name)
 
@@ -114,7 +121,9 @@ def test_a_file_that_may_not_be_read_is_refused(tmp_path, check_file):
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_files_that_include_each_other_are_refused(check, tmp_path, count):
     for number in range(count):
-        (tmp_path / f"f{number}.sdf").write_text(sdf_model("m", include(f"f{(number + 1) % count}.sdf")))
+        (tmp_path / f"f{number}.sdf").write_text(
+            sdf_model("m", include(f"f{(number + 1) % count}.sdf"))
+        )
     said, _ = check(world(include("f0.sdf")))
     cycle = " includes ".join(f"f{number}.sdf" for number in (*range(count), 0))
     assert f"form a cycle: {cycle}" in refusal(said, tmp_path)
@@ -123,15 +132,21 @@ def test_files_that_include_each_other_are_refused(check, tmp_path, count):
 
 def test_files_that_include_each_other_through_a_linked_folder_are_refused(tmp_path, refused):
     (tmp_path / "again").symlink_to(tmp_path)
-    (tmp_path / "f.sdf").write_text(sdf_model("m", include("again/f.sdf") + include("again/f.sdf", "<name>n</name>")))
+    (tmp_path / "f.sdf").write_text(
+        sdf_model("m", include("again/f.sdf") + include("again/f.sdf", "<name>n</name>"))
+    )
     refused(world(include("f.sdf")))
 
 
-@pytest.mark.parametrize("last", slow(pytest.mark.fuzz, [LINK, ""]), ids=["with a link", "with nothing"])
+@pytest.mark.parametrize(
+    "last", slow(pytest.mark.fuzz, [LINK, ""]), ids=["with a link", "with nothing"]
+)
 def test_includes_that_multiply_are_bounded(tmp_path, refused, last):
     """Nine files, ten includes in each: a thousand million links."""
     for number in range(9):
-        inside = "".join(include(f"f{number + 1}.sdf", f"<name>n{copy}</name>") for copy in range(10))
+        inside = "".join(
+            include(f"f{number + 1}.sdf", f"<name>n{copy}</name>") for copy in range(10)
+        )
         (tmp_path / f"f{number}.sdf").write_text(sdf_model("m", inside))
     (tmp_path / "f9.sdf").write_text(sdf_model("m", last))
     refused(world(include("f0.sdf")))

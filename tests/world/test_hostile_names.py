@@ -6,7 +6,17 @@ from pathlib import Path
 import pytest
 
 from tests.tiers import slow
-from tests.world.hostile import LINK, check_bounded, frame, include, model, read_or_refused, refusal, shape, world
+from tests.world.hostile import (
+    LINK,
+    check_bounded,
+    frame,
+    include,
+    model,
+    read_or_refused,
+    refusal,
+    shape,
+    world,
+)
 
 HARMFUL = r"""
 ../../../../../../etc/passwd a/../../../../../../../etc/passwd %2e%2e/%2e%2e/%2e%2e/etc/passwd ..%2f..%2f..%2f..%2fetc/passwd
@@ -62,18 +72,35 @@ def test_a_strange_name_is_read_or_refused_and_never_steers_the_terminal(check, 
 
 
 @pytest.mark.parametrize("name", RUDE)
-@pytest.mark.parametrize("wrong", ["<pose>{}</pose>", "<frame name='{}'/><frame name='x' attached_to='{}'/>"])
+@pytest.mark.parametrize(
+    "wrong", ["<pose>{}</pose>", "<frame name='{}'/><frame name='x' attached_to='{}'/>"]
+)
 def test_what_a_complaint_quotes_never_steers_the_terminal(check, name, wrong):
     use = "<model name='u'><pose relative_to='x{}'/></model>"
     refusal(
-        *check(world((wrong + use).replace("{}", name) + f"<model name='{name}'>{LINK}<pose>{name} x</pose></model>"))
+        *check(
+            world(
+                (wrong + use).replace("{}", name)
+                + f"<model name='{name}'>{LINK}<pose>{name} x</pose></model>"
+            )
+        )
     )
 
 
 def test_a_complaint_stays_readable_however_long_the_names_are(check):
     name = "n" * 100_000
     assert (
-        len(refusal(*check(model(LINK + frame(name, name) + f"<link name='k'><pose relative_to='{name}'/></link>"))))
+        len(
+            refusal(
+                *check(
+                    model(
+                        LINK
+                        + frame(name, name)
+                        + f"<link name='k'><pose relative_to='{name}'/></link>"
+                    )
+                )
+            )
+        )
         < 5000
     )
 

@@ -66,7 +66,9 @@ def test_a_file_that_is_no_scenario(tmp_path, text):
 
 
 def test_an_unknown_name_lists_the_known_ones():
-    with pytest.raises(UserError, match=r"no scenario 'dich' \(did you mean ditch\?\); bundled are"):
+    with pytest.raises(
+        UserError, match=r"no scenario 'dich' \(did you mean ditch\?\); bundled are"
+    ):
         find_scenario("dich")
 
 

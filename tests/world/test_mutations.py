@@ -16,7 +16,13 @@ from ddenv.world.write import without
 from tests.conftest import DATA, ROOT
 from tests.tiers import examples, slow
 from tests.world.mutations import BYTES, STEPS, changed, changed_bytes, elements, tree_of
-from tests.world.soundness import OF_AN_ELEMENT, READING, check_smaller_worlds, check_world, read_or_refused
+from tests.world.soundness import (
+    OF_AN_ELEMENT,
+    READING,
+    check_smaller_worlds,
+    check_world,
+    read_or_refused,
+)
 
 WORLDS = {path.name: path.read_bytes() for path in (DATA / "gazebo.world", DATA / "frames.world")}
 SHARED = ROOT.parent / "shared" / "worlds" / "frictionpatch6.world"
@@ -49,13 +55,16 @@ def small_world(inside: str) -> World:
 
 
 def test_a_model_of_which_nothing_can_be_touched_is_static():
-    world = small_world("<model name='outer'><model name='plugin'><static>1</static></model></model>")
+    world = small_world(
+        "<model name='outer'><model name='plugin'><static>1</static></model></model>"
+    )
     check_world(world)
     assert world.models[0].static
 
 
 @pytest.mark.parametrize(
-    "empty", ["<model name='a'/>", "<model name='a' />", "<model name='a'></model>", "<model name='a'\n/>"]
+    "empty",
+    ["<model name='a'/>", "<model name='a' />", "<model name='a'></model>", "<model name='a'\n/>"],
 )
 @pytest.mark.parametrize("after", ["", "\n", "<model name='b'><pose>7 0 0 0 0 0</pose></model>"])
 def test_what_is_said_of_a_model_in_an_empty_element_goes_alone(empty, after):
@@ -63,14 +72,18 @@ def test_what_is_said_of_a_model_in_an_empty_element_goes_alone(empty, after):
     world = small_world(f"<model name='a'>{BOX}</model><model name='b'>{BOX}</model>{state}")
     check_world(world)
     check_smaller_worlds(world)
-    assert without(world, frozenset("a")).endswith(f"<state world_name='w'>{after}</state></world></sdf>".encode())
+    assert without(world, frozenset("a")).endswith(
+        f"<state world_name='w'>{after}</state></world></sdf>".encode()
+    )
 
 
 @pytest.mark.parametrize("name", ["a", "a::b", "a::", "::a", "a #2", " a", "rack::boards"])
 def test_a_model_that_others_stand_on_stays_whatever_its_name(name):
     on = f"<model name='on'><pose relative_to='{name}'>0 0 1 0 0 0</pose>{BOX}</model>"
     try:
-        world = small_world(f"<model name='{name}'>{BOX}</model><model name='off'>{BOX}</model>{on}")
+        world = small_world(
+            f"<model name='{name}'>{BOX}</model><model name='off'>{BOX}</model>{on}"
+        )
     except UserError:
         return
     check_smaller_worlds(world)
@@ -136,7 +149,9 @@ def test_no_number_at_all_can_break_the_reader(name, value):
                 raise
 
 
-@pytest.mark.skipif(not SHARED.is_file(), reason="the folder shared/worlds is not beside this checkout")
+@pytest.mark.skipif(
+    not SHARED.is_file(), reason="the folder shared/worlds is not beside this checkout"
+)
 @bounded(0.5)
 @given(steps=st.lists(STEPS, min_size=1, max_size=3))
 def test_a_real_world_that_was_changed_is_read_soundly_or_refused(steps):

@@ -25,9 +25,16 @@ AHEAD = Goal(x=2.4, y=0.0, tolerance=0.3)
 FAR = Goal(x=6.0, y=0.0)
 
 
-def block(x: float, y: float, *size: float, z: float = 0.0, yaw: float = 0.0, pitch: float = 0.0) -> Collision:
+def block(
+    x: float, y: float, *size: float, z: float = 0.0, yaw: float = 0.0, pitch: float = 0.0
+) -> Collision:
     """A box that stands at the height `z`."""
-    return Collision(name="c", shape=Box(size), pose=Pose.from_rpy(x, y, z + size[2] / 2, 0.0, pitch, yaw), mu=1.0)
+    return Collision(
+        name="c",
+        shape=Box(size),
+        pose=Pose.from_rpy(x, y, z + size[2] / 2, 0.0, pitch, yaw),
+        mu=1.0,
+    )
 
 
 def world_of(*shapes: Collision, static: bool = True, yaw: float = 0.0) -> World:
@@ -36,10 +43,20 @@ def world_of(*shapes: Collision, static: bool = True, yaw: float = 0.0) -> World
     turned = tuple(replace(one, pose=turn @ one.pose) for one in shapes)
     ground = (Collision(name="c", shape=Plane((1.0, 1.0)), pose=Pose(), mu=1.0),)
     models = (
-        Model(name=name, pose=Pose(), static=still, links=(Link(name="l", pose=Pose(), inertia=None, collisions=own, visuals=()),), joints=(), spans=(), line=1)
+        Model(
+            name=name,
+            pose=Pose(),
+            static=still,
+            links=(Link(name="l", pose=Pose(), inertia=None, collisions=own, visuals=()),),
+            joints=(),
+            spans=(),
+            line=1,
+        )
         for name, still, own in (("ground", True, ground), ("house", static, turned))
     )
-    return World(path=Path("w.sdf"), name="w", text=b"", gravity=(0.0, 0.0, -9.8), models=tuple(models))
+    return World(
+        path=Path("w.sdf"), name="w", text=b"", gravity=(0.0, 0.0, -9.8), models=tuple(models)
+    )
 
 
 def room(*between: Collision, thick: float = 0.1) -> list[Collision]:
@@ -63,12 +80,19 @@ def said(world: World, goal: Goal = AHEAD) -> list[str]:
 
 
 @settings(max_examples=25)
-@given(st.floats(0.2, 2.0), st.floats(-0.8, 0.8), st.sampled_from((0.005, 0.1, 0.5)), st.floats(-3.0, 3.0))
+@given(
+    st.floats(0.2, 2.0),
+    st.floats(-0.8, 0.8),
+    st.sampled_from((0.005, 0.1, 0.5)),
+    st.floats(-3.0, 3.0),
+)
 def test_the_widest_way_is_as_wide_as_the_door(width, at, thick, yaw):
     world = world_of(*room(*door(width, at, thick)), yaw=yaw)
     start, end = ((math.cos(yaw) * x, math.sin(yaw) * x) for x in (-1.5, 1.5))
     free = clearance(world, WIDTH, HEIGHT, 0.0, [start, end])
-    assert free.widest(free.near(start, 0.1), free.near(end, 0.1)) == pytest.approx(width, abs=2 * CELL)
+    assert free.widest(free.near(start, 0.1), free.near(end, 0.1)) == pytest.approx(
+        width, abs=2 * CELL
+    )
 
 
 def test_a_robot_that_does_not_fit_is_told_how_wide_the_door_is():
@@ -84,10 +108,17 @@ def test_a_robot_that_does_not_fit_is_told_how_wide_the_door_is():
 def roof(height: float) -> list[Collision]:
     """A mesh across the room, 2 m wide, that rises to this height, m, on both sides."""
     corners = [(x, y, z) for y in (-2.0, 2.0) for x, z in ((-1.0, 0.0), (1.0, 0.0), (0.0, height))]
-    return [Collision(name="c", shape=Mesh("roof", *convex_hull(np.array(corners))), pose=Pose(), mu=1.0)]
+    return [
+        Collision(
+            name="c", shape=Mesh("roof", *convex_hull(np.array(corners))), pose=Pose(), mu=1.0
+        )
+    ]
 
 
-RAMP = [block(0.0, 0.0, 1.0, 4.0, 0.5), *(block(x, 0.0, 2.0, 4.0, 0.01, z=0.2, pitch=x / 3) for x in (-1.2, 1.2))]
+RAMP = [
+    block(0.0, 0.0, 1.0, 4.0, 0.5),
+    *(block(x, 0.0, 2.0, 4.0, 0.01, z=0.2, pitch=x / 3) for x in (-1.2, 1.2)),
+]
 
 
 @pytest.mark.parametrize(
@@ -99,7 +130,10 @@ RAMP = [block(0.0, 0.0, 1.0, 4.0, 0.5), *(block(x, 0.0, 2.0, 4.0, 0.01, z=0.2, p
         "lintel": ([block(0.0, 0.0, 1.0, 4.0, 0.5, z=0.5)], False),
         "table": ([block(0.0, 0.0, 1.0, 4.0, 0.05, z=0.3)], True),
         "slope": (roof(0.8), False),
-        "pillar": ([Collision(name="c", shape=Cylinder(1.5, 2.0), pose=Pose((0.0, 0.0, 1.0)), mu=1.0)], True),
+        "pillar": (
+            [Collision(name="c", shape=Cylinder(1.5, 2.0), pose=Pose((0.0, 0.0, 1.0)), mu=1.0)],
+            True,
+        ),
     }.values(),
 )
 def test_what_is_driven_over_or_under_does_not_block(between, blocks):

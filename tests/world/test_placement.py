@@ -71,7 +71,14 @@ def stone(count: int, radius: float = 0.4) -> Mesh:
 
 
 CUBE = mesh_of(np.array(list(product((-0.2, 0.2), repeat=3))))
-SHAPES = (Box((0.4, 0.6, 0.8)), Cylinder(0.25, 0.5), Ellipsoid((0.3, 0.2, 0.5)), CUBE, stone(12), stone(40))
+SHAPES = (
+    Box((0.4, 0.6, 0.8)),
+    Cylinder(0.25, 0.5),
+    Ellipsoid((0.3, 0.2, 0.5)),
+    CUBE,
+    stone(12),
+    stone(40),
+)
 ROUND = (Sphere(0.3), Capsule(0.2, 0.6))
 
 
@@ -81,14 +88,27 @@ def true_depth(a: Hull, b: Hull) -> float:
     return max(0.0, float((-ConvexHull(differences).equations[:, 3]).min()))
 
 
-@given(st.sampled_from(SHAPES), st.sampled_from(SHAPES), turned, turned, st.tuples(*[st.floats(-0.5, 0.5)] * 3))
+@given(
+    st.sampled_from(SHAPES),
+    st.sampled_from(SHAPES),
+    turned,
+    turned,
+    st.tuples(*[st.floats(-0.5, 0.5)] * 3),
+)
 def test_the_depth_of_bodies_with_faces_is_exact(first, second, rpy, other, at):
     a, b = body(first, (0, 0, 0), rpy), body(second, at, other)
     assert overlap(a, b) == pytest.approx(true_depth(a, b), abs=1e-4)
     assert overlap(b, a) == pytest.approx(overlap(a, b), abs=1e-4)
 
 
-@given(st.sampled_from(SHAPES + ROUND), st.sampled_from(SHAPES + ROUND), turned, turned, turned, st.floats(0.01, 5))
+@given(
+    st.sampled_from(SHAPES + ROUND),
+    st.sampled_from(SHAPES + ROUND),
+    turned,
+    turned,
+    turned,
+    st.floats(0.01, 5),
+)
 def test_bodies_apart_do_not_overlap(first, second, rpy, other, direction, gap):
     length = math.sqrt(sum(part * part for part in direction))
     if length < 0.1:
@@ -106,7 +126,9 @@ def test_the_depth_is_what_must_be_moved():
     assert overlap(body(ball), body(ball)) == pytest.approx(1.0)
     assert overlap(body(box), body(Capsule(0.2, 1.0), (0, 0, 1.1))) == pytest.approx(0.1)
     assert overlap(body(box), body(Capsule(0.2, 1.0), (0.6, 0, 0))) == pytest.approx(0.1)
-    assert overlap(body(Capsule(0.2, 2.0)), body(Capsule(0.1, 2.0), (0.25, 0, 0), (1.2, 0, 0))) == pytest.approx(0.05)
+    assert overlap(
+        body(Capsule(0.2, 2.0)), body(Capsule(0.1, 2.0), (0.25, 0, 0), (1.2, 0, 0))
+    ) == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize("shape", [Sphere(1.0), Capsule(1.0, 0.5), Capsule(1.0, 3.0)], ids=repr)
@@ -114,7 +136,9 @@ def test_round_bodies_beside_an_edge_are_not_inside(shape):
     edge = body(Box((1, 1, 6)))
     beside = 0.5 + 1.01 / math.sqrt(2)
     assert overlap(edge, body(shape, (beside, beside, 0.3))) == 0.0
-    assert overlap(edge, body(shape, (beside - 0.05, beside - 0.05, 0.3))) == pytest.approx(0.05 * 2**0.5 - 0.01)
+    assert overlap(edge, body(shape, (beside - 0.05, beside - 0.05, 0.3))) == pytest.approx(
+        0.05 * 2**0.5 - 0.01
+    )
 
 
 HUSKY = read_model(SDF / "robots" / "husky.sdf")
@@ -156,13 +180,21 @@ def test_the_place_that_the_error_names_is_free_and_near(z):
 
 
 def world_with(shape: Shape, pose: Pose) -> World:
-    link = Link(name="l", pose=pose, inertia=None, collisions=(Collision(name="c", shape=shape, pose=pose, mu=1.0),), visuals=())
+    link = Link(
+        name="l",
+        pose=pose,
+        inertia=None,
+        collisions=(Collision(name="c", shape=shape, pose=pose, mu=1.0),),
+        visuals=(),
+    )
     model = Model(name="thing", pose=pose, static=True, links=(link,), joints=(), spans=(), line=1)
     return World(path=Path("w.sdf"), name="w", text=b"", gravity=(0.0, 0.0, -9.8), models=(model,))
 
 
 @pytest.mark.parametrize(
-    "shape", [Capsule(0.3, 1.0), Ellipsoid((0.3, 0.3, 0.8)), stone(60)], ids=lambda shape: type(shape).__name__
+    "shape",
+    [Capsule(0.3, 1.0), Ellipsoid((0.3, 0.3, 0.8)), stone(60)],
+    ids=lambda shape: type(shape).__name__,
 )
 def test_round_things_and_meshes_are_in_the_way_too(shape):
     # A mesh may be hollow.
@@ -184,17 +216,35 @@ def test_the_start_on_terrain_is_at_its_height():
     hill = world_with(slope, Pose((0.0, 0.0, 1.0)))
     with pytest.raises(UserError, match=r"inside model 'thing' by .*free nearby: ") as caught:
         check_spawn(hill, HUSKY, Spawn(x=0, y=0, z=0.2))
-    free = Spawn(**dict(zip("xyz", map(float, str(caught.value).partition("--spawn=")[2].split(",")), strict=False)))
+    free = Spawn(
+        **dict(
+            zip(
+                "xyz",
+                map(float, str(caught.value).partition("--spawn=")[2].split(",")),
+                strict=False,
+            )
+        )
+    )
     check_spawn(hill, HUSKY, free)
     assert (free.x, free.y) == (0, 0)
     assert drop(hill, HUSKY, free) < 0.03
-    assert drop(hill, HUSKY, free.model_copy(update={"z": free.z + 1})) == pytest.approx(1.0, abs=0.03)
+    assert drop(hill, HUSKY, free.model_copy(update={"z": free.z + 1})) == pytest.approx(
+        1.0, abs=0.03
+    )
     # Beyond its edge there is nothing.
     assert drop(hill, HUSKY, Spawn(x=15, y=0, z=9)) == 0.0
 
 
 def test_a_robot_without_shapes_cannot_start():
-    ghost = Model(name="ghost", pose=Pose(), static=False, links=(Link(name="l", pose=Pose(), inertia=None, collisions=(), visuals=()),), joints=(), spans=(), line=1)
+    ghost = Model(
+        name="ghost",
+        pose=Pose(),
+        static=False,
+        links=(Link(name="l", pose=Pose(), inertia=None, collisions=(), visuals=()),),
+        joints=(),
+        spans=(),
+        line=1,
+    )
     with pytest.raises(UserError, match="'ghost' has no collision shapes"):
         check_spawn(WALL, ghost, Spawn(x=0, y=0, z=1))
 
@@ -210,7 +260,13 @@ def box(name, x, z=0.5, mass=1.0):
 
 def test_each_pair_is_found_once_with_its_depth():
     pairs = inside(
-        world(box("first", 0), box("second", 0.8), box("apart", 3), box("sunk", 6, z=0.3), box("post", 0.8, mass=None))
+        world(
+            box("first", 0),
+            box("second", 0.8),
+            box("apart", 3),
+            box("sunk", 6, z=0.3),
+            box("post", 0.8, mass=None),
+        )
     )
     assert {(pair.name, pair.other) for pair in pairs} == {
         ("first", "second"),
@@ -231,7 +287,9 @@ def test_what_touches_is_not_inside_and_what_never_moves_may_overlap(x, mass):
 
 def test_one_line_says_it_all():
     ((_, words),) = note_inside(world(box("first", 0), box("second", 0.8), box("third", 0.9)))
-    assert words == "second starts 0.90 m inside third, and 2 more pairs: they push each other apart"
+    assert (
+        words == "second starts 0.90 m inside third, and 2 more pairs: they push each other apart"
+    )
     assert list(note_inside(WALL)) == []
 
 
@@ -253,16 +311,23 @@ def test_the_way_down_is_measured_to_what_is_below(spawn, height):
 def test_wheels_in_the_air_and_a_world_that_pulls_nothing_down_are_noted():
     # Between the wheels a block of 0.3 m stands on the deck.
     block = world(box_model("block", "0 0 0.45 0 0 0", "0.3 0.3 0.3", None)).models[-1]
-    ((about, words),) = notes_on_start(replace(WALL, models=(*WALL.models, block)), HUSKY, Spawn(x=0, y=0, z=0.65))
+    ((about, words),) = notes_on_start(
+        replace(WALL, models=(*WALL.models, block)), HUSKY, Spawn(x=0, y=0, z=0.65)
+    )
     assert about == "wheels" and "no wheel touches anything" in words
     for gravity in (0.0, 9.81):
         floating = replace(WALL, gravity=(0.0, 0.0, gravity))
-        assert [about for about, _ in notes_on_start(floating, HUSKY, Spawn(x=0, y=0, z=0.45))] == ["gravity"]
+        assert [about for about, _ in notes_on_start(floating, HUSKY, Spawn(x=0, y=0, z=0.45))] == [
+            "gravity"
+        ]
 
 
 def test_a_goal_inside_a_post_is_noted():
     start = Spawn(x=0, y=0, z=0.45)
-    assert [about for about, _ in notes_on_start(WALL, HUSKY, start, Goal(x=0, y=-4))] == ["goal", "passage"]
+    assert [about for about, _ in notes_on_start(WALL, HUSKY, start, Goal(x=0, y=-4))] == [
+        "goal",
+        "passage",
+    ]
     assert list(notes_on_start(WALL, HUSKY, start, Goal(x=0, y=-3))) == []
 
 
@@ -280,7 +345,9 @@ def test_a_goal_inside_a_post_is_noted():
 def test_a_floor_that_carries_everything_is_offered_to_stay(width, top, ground, removable, offered):
     floor = box_model("floor", f"0 0 {top - 0.05} 0 0 0", f"{width} {width} 0.1", None)
     text = f'<sdf version="1.9"><world name="w">{ground}{floor}{box("crate", 3)}</world></sdf>'
-    notes = list(note_floor(parse_world(text.encode(), DATA), HUSKY, Spawn(x=0, y=0, z=0.2), removable))
+    notes = list(
+        note_floor(parse_world(text.encode(), DATA), HUSKY, Spawn(x=0, y=0, z=0.2), removable)
+    )
     assert [about for about, _ in notes] == offered
     assert all("--protect 'floor'" in words for _, words in notes)
 
@@ -293,10 +360,16 @@ def seen_as(*visuals):
         f"<model name='{name}'><static>1</static>{link.format(box.format(1.5), drawn)}</model>"
         for name, drawn in (
             ("post", f"<visual name='v'>{box.format(1)}</visual>"),
-            ("odd", "".join(f"<visual name='{size}'>{box.format(size)}</visual>" for size in visuals)),
+            (
+                "odd",
+                "".join(f"<visual name='{size}'>{box.format(size)}</visual>" for size in visuals),
+            ),
         )
     ]
-    return parse_world(f"<sdf version='1.9'><world name='w'>{''.join(models)}</world></sdf>".encode(), Path("w.sdf"))
+    return parse_world(
+        f"<sdf version='1.9'><world name='w'>{''.join(models)}</world></sdf>".encode(),
+        Path("w.sdf"),
+    )
 
 
 def test_what_can_be_hit_where_nothing_is_seen_is_named():

@@ -49,7 +49,9 @@ SCALED = {
 
 def test_sizes_are_as_gazebo_scaled_them(real):
     state = ElementTree.fromstring(real.text).find("world/state")
-    scaled = {saved.get("name") for saved in state.findall("model") if saved.find("scale").text != "1 1 1"}
+    scaled = {
+        saved.get("name") for saved in state.findall("model") if saved.find("scale").text != "1 1 1"
+    }
     assert scaled == set(SCALED[real.path.name])
     for name, height in SCALED[real.path.name].items():
         assert real.model(name).collisions[0].shape == Box(pytest.approx((20, 20, height)))
@@ -62,7 +64,9 @@ def test_a_smaller_world_is_the_same_text_without_the_removed_models_and_their_s
     text = without(real, frozenset(removed))
     assert text == _by_hand(real.text, removed)
     again = parse_world(text, real.path, READINGS[real.path.name])
-    assert [model.name for model in again.models] == [m.name for m in real.models if m.name not in removed]
+    assert [model.name for model in again.models] == [
+        m.name for m in real.models if m.name not in removed
+    ]
     assert all(model.links == real.model(model.name).links for model in again.models)
 
 

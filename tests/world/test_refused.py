@@ -55,7 +55,9 @@ OF_THE_FILE: dict[str, dict[str, list[bytes]]] = {
             model(LINK).replace(b"'m'", b"'\0'"),
             *(world(MODEL).decode().encode(name) for name in ("utf-16", "utf-16-be", "utf-32")),
         ],
-        ": cannot be decoded: .*; save it as UTF-8": [in_encoding(name) for name in ("klingon", "zip", "shift_jis")],
+        ": cannot be decoded: .*; save it as UTF-8": [
+            in_encoding(name) for name in ("klingon", "zip", "shift_jis")
+        ],
     },
     "a DOCTYPE, and": {
         r":1:1: DOCTYPE is not allowed \(its entities can read other files and exhaust memory\); remove it": [
@@ -73,14 +75,28 @@ OF_THE_FILE: dict[str, dict[str, list[bytes]]] = {
         r":1:\d+: elements are nested more than 100 deep": [world("<a>" * 101 + "</a>" * 101)]
     },
     "a root that is not `<sdf>`": {
-        ":1: /html: expected <sdf> as the outermost element": [b"<html><body><p>404</p></body></html>"],
+        ":1: /html: expected <sdf> as the outermost element": [
+            b"<html><body><p>404</p></body></html>"
+        ],
         ":1: /sdf: has no version attribute; use SDF 1.4 to 1.12": [
             b"<sdf><world name='w'/></sdf>",
             *(world(MODEL, version) for version in ("", " ")),
         ],
         ":1: /sdf: version '.*' is not supported; use SDF 1.4 to 1.12": [
             world(MODEL, version)
-            for version in ("0.1", "1", "1.3", "1.13", "1.99", "2.0", "-1.6", "nan", "1.6.0", "6", "9" * 5000)
+            for version in (
+                "0.1",
+                "1",
+                "1.3",
+                "1.13",
+                "1.99",
+                "2.0",
+                "-1.6",
+                "nan",
+                "1.6.0",
+                "6",
+                "9" * 5000,
+            )
         ],
     },
     "no `<world>`": {
@@ -101,8 +117,23 @@ OF_THE_FILE: dict[str, dict[str, list[bytes]]] = {
 
 POSES = {
     r"/pose: expected 6 finite numbers, found '": (
-        *("nan 0 0 0 0 0", "0 inf 0 0 0 0", "0 0 -inf 0 0 0", "0 0 0 nan 0 0", "1e400 0 0 0 0 0", "1 2", "0 0 0"),
-        *("0 0 0 0 0 0 0", "a b c d e f", "0,0,0,0,0,0", "0x1 0 0 0 0 0", "1_0 0 0 0 0 0", "0 " * 100_000),
+        *(
+            "nan 0 0 0 0 0",
+            "0 inf 0 0 0 0",
+            "0 0 -inf 0 0 0",
+            "0 0 0 nan 0 0",
+            "1e400 0 0 0 0 0",
+            "1 2",
+            "0 0 0",
+        ),
+        *(
+            "0 0 0 0 0 0 0",
+            "a b c d e f",
+            "0,0,0,0,0,0",
+            "0x1 0 0 0 0 0",
+            "1_0 0 0 0 0 0",
+            "0 " * 100_000,
+        ),
     ),
 }
 STATE = f"{MODEL}<state world_name='w'><model name='m'>%s</model></state>"
@@ -132,7 +163,9 @@ CUBE = "<box><size>1 1 1</size></box>"
 
 
 def surface(inside: str, more: str = "") -> bytes:
-    return shape(f"{CUBE}</geometry><surface>{inside}</surface>{more}<geometry>").replace(b"<geometry></geometry>", b"")
+    return shape(f"{CUBE}</geometry><surface>{inside}</surface>{more}<geometry>").replace(
+        b"<geometry></geometry>", b""
+    )
 
 
 def two(*joints: str) -> bytes:
@@ -145,11 +178,16 @@ def hinge(inside: str, kind: str = "revolute") -> bytes:
 
 def nameless(text: str) -> list[bytes]:
     """The element without its name, and with names that are none."""
-    return [world(text.replace(" name=''", given, 1)) for given in ("", " name=''", " name='  '", " name='&#10;'")]
+    return [
+        world(text.replace(" name=''", given, 1))
+        for given in ("", " name=''", " name='  '", " name='&#10;'")
+    ]
 
 
 def on_frame_a(*others: str) -> bytes:
-    return world(f"{''.join(others)}<model name='m'><pose relative_to='a'>0 0 0 0 0 0</pose>{LINK}</model>")
+    return world(
+        f"{''.join(others)}<model name='m'><pose relative_to='a'>0 0 0 0 0 0</pose>{LINK}</model>"
+    )
 
 
 def populated(distribution: str, more: str = "") -> bytes:
@@ -163,28 +201,40 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
         "only Gazebo Classic knows the places of a 'uniform' distribution; .* --ignore population": [
             populated("<type>uniform</type>")
         ],
-        "/population: has no distribution/step": [populated("<type>grid</type><rows>1</rows><cols>1</cols>")],
+        "/population: has no distribution/step": [
+            populated("<type>grid</type><rows>1</rows><cols>1</cols>")
+        ],
         r"/step: must be between -1e\+06 and 1e\+06 m": [
             populated("<type>grid</type><rows>3</rows><cols>3</cols><step>1e308 1e308 1</step>")
         ],
         r"/size: must be between 0 and 1e\+06 m": [
-            populated("<type>linear-x</type>", "<model_count>2</model_count><box><size>1 -1 1</size></box>")
+            populated(
+                "<type>linear-x</type>",
+                "<model_count>2</model_count><box><size>1 -1 1</size></box>",
+            )
         ],
         "/population: must stand for 1 to 50000 models; see its rows and cols, or model_count": [
-            populated(f"<type>grid</type><rows>1</rows>{cols}") for cols in ("", "<cols>0</cols>", "<cols>1e9</cols>")
+            populated(f"<type>grid</type><rows>1</rows>{cols}")
+            for cols in ("", "<cols>0</cols>", "<cols>1e9</cols>")
         ],
     },
-    "`<joint>` between models": {"joints between models are not supported": [world("<joint name='j' type='fixed'/>")]},
+    "`<joint>` between models": {
+        "joints between models are not supported": [world("<joint name='j' type='fixed'/>")]
+    },
     "a second `<state>`": {
         "/state: a second <state>; a world may have only one": [world("<state/><state/>")],
         "/state/insertions: <insertions> in <state>": [
             world("<state><insertions><model name='m'/></insertions></state>")
         ],
-        "/state/deletions: <deletions> in <state>": [world("<state><deletions><name>m</name></deletions></state>")],
+        "/state/deletions: <deletions> in <state>": [
+            world("<state><deletions><name>m</name></deletions></state>")
+        ],
     },
     "a model, link, joint": {
         r"/model(\[@name='\s*'\])?: has no name": nameless(f"<model name=''>{LINK}</model>"),
-        r"/link(\[@name='\s*'\])?: has no name": nameless("<model name='m'><link name=''/></model>"),
+        r"/link(\[@name='\s*'\])?: has no name": nameless(
+            "<model name='m'><link name=''/></model>"
+        ),
         r"/collision(\[@name='\s*'\])?: has no name": nameless(
             f"<model name='m'><link name='l'><collision name=''>{BOX}</collision></link></model>"
         ),
@@ -215,17 +265,27 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
         ],
     },
     "a pose that is not six": {
-        words: [world(text.replace("%s", f"<pose>{pose}</pose>")) for text in WITH_A_POSE for pose in poses]
+        words: [
+            world(text.replace("%s", f"<pose>{pose}</pose>"))
+            for text in WITH_A_POSE
+            for pose in poses
+        ]
         for words, poses in POSES.items()
     },
     "a quaternion without": {
-        "the quaternion has no usable length": [model(f"<pose rotation_format='quat_xyzw'>0 0 0 0 0 0 0</pose>{LINK}")],
-        "rotation_format 'rpy' is unknown": [model(f"<pose rotation_format='rpy'>0 0 0 0 0 0</pose>{LINK}")],
+        "the quaternion has no usable length": [
+            model(f"<pose rotation_format='quat_xyzw'>0 0 0 0 0 0 0</pose>{LINK}")
+        ],
+        "rotation_format 'rpy' is unknown": [
+            model(f"<pose rotation_format='rpy'>0 0 0 0 0 0</pose>{LINK}")
+        ],
     },
     "a frame that does not exist": {
         "there is no frame '[ao]' here": [
             on_frame_a(),
-            world(f"<model name='m'>{LINK}<link name='k'><pose relative_to='o'/></link></model><model name='o'/>"),
+            world(
+                f"<model name='m'>{LINK}<link name='k'><pose relative_to='o'/></link></model><model name='o'/>"
+            ),
             world(f"<model name='m' placement_frame='a'>{LINK}</model>"),
         ],
         r"no frame 'chasis' here \(did you mean chassis\?\)": [
@@ -246,18 +306,32 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
             on_frame_a(frame("a", "b"), frame("b", "c"), frame("c", "a"))
         ],
         "/pose: the frames form a cycle: b -> a -> b$": [
-            world("".join(f"<model name='{a}'><pose relative_to='{b}'/>{LINK}</model>" for a, b in ("ab", "ba"))),
-            model("".join(f"<link name='{a}'><pose relative_to='{b}'/></link>" for a, b in ("ab", "ba"))),
+            world(
+                "".join(
+                    f"<model name='{a}'><pose relative_to='{b}'/>{LINK}</model>"
+                    for a, b in ("ab", "ba")
+                )
+            ),
+            model(
+                "".join(
+                    f"<link name='{a}'><pose relative_to='{b}'/></link>" for a, b in ("ab", "ba")
+                )
+            ),
         ],
         "/pose: the frames form a cycle: j -> a -> j$": [
-            model("<link name='p'/><link name='a'><pose relative_to='j'/></link>" + joint(ends("p", "a"), "fixed"))
+            model(
+                "<link name='p'/><link name='a'><pose relative_to='j'/></link>"
+                + joint(ends("p", "a"), "fixed")
+            )
         ],
         "the attachments of frames form a cycle": [
             two(joint(ends("a", "j"), "fixed")),
             two(attached("f", "g"), attached("g", "f"), joint(ends("f", "a"), "fixed")),
         ],
     },
-    "true or false": {"/static: expected true or false, found 'maybe'": [model(f"<static>maybe</static>{LINK}")]},
+    "true or false": {
+        "/static: expected true or false, found 'maybe'": [model(f"<static>maybe</static>{LINK}")]
+    },
     "`<include>` without a `<uri>`": {"/include: has no <uri>": [world("<include/>")]},
     "`<include>` of a file that cannot be found": {
         "'model://nowhere' was not found": [world(include("model://nowhere"))]
@@ -273,17 +347,25 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
             world(include("model://../../x")),
             world(include("model://%2e%2e/%2e%2e/secret")),
         ],
-        "/include: 'ftp://x/y' cannot be included: scheme 'ftp:' is not supported": [world(include("ftp://x/y"))],
+        "/include: 'ftp://x/y' cannot be included: scheme 'ftp:' is not supported": [
+            world(include("ftp://x/y"))
+        ],
         r"/mesh: .* leaves its folder": [shape("<mesh><uri>../../etc/passwd</uri></mesh>")],
     },
     "a shape with sizes": {
         **{
-            rf"{COLLISION}/geometry/\w+/{tag}: {NO_SIZE}": [shape(text.format(size)) for size in NO_SIZES]
+            rf"{COLLISION}/geometry/\w+/{tag}: {NO_SIZE}": [
+                shape(text.format(size)) for size in NO_SIZES
+            ]
             for tag, text in SIZES.items()
         },
-        "<torus> is not a known shape; use one of box": [shape("<torus><radius>1</radius></torus>")],
+        "<torus> is not a known shape; use one of box": [
+            shape("<torus><radius>1</radius></torus>")
+        ],
     },
-    "a plane's normal": {"/normal: the normal has no usable length": [shape("<plane><normal>0 0 0</normal></plane>")]},
+    "a plane's normal": {
+        "/normal: the normal has no usable length": [shape("<plane><normal>0 0 0</normal></plane>")]
+    },
     "a polyline of fewer": {
         "needs at least three <point>s that are not on one line": [
             shape("<polyline><point>0 0</point><height>1</height></polyline>"),
@@ -294,13 +376,16 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
         ],
     },
     "a collision mesh": {
-        "/mesh: mesh 'model://x/y.dae' is not available": [shape("<mesh><uri>model://x/y.dae</uri></mesh>")],
+        "/mesh: mesh 'model://x/y.dae' is not available": [
+            shape("<mesh><uri>model://x/y.dae</uri></mesh>")
+        ],
         r"/mesh: .*'\.world' are not supported": [shape("<mesh><uri>hostile.world</uri></mesh>")],
         "/mesh: has no <uri>": [shape("<mesh/>")],
     },
     "a scale of zero": {
         r"/mesh/scale: a scale must be from 1e-09 to 1e\+06": [
-            shape(f"<mesh><uri>a.obj</uri><scale>{scale}</scale></mesh>") for scale in ("0 0 0", "0 1 1", "1 0 1")
+            shape(f"<mesh><uri>a.obj</uri><scale>{scale}</scale></mesh>")
+            for scale in ("0 0 0", "0 1 1", "1 0 1")
         ],
         r"/state/model\[@name='m'\]/scale: a scale must be from 1e-06": [
             world(STATE % f"<scale>{scale}</scale>")
@@ -320,15 +405,21 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
         ],
     },
     "a collision `<image>`": {
-        "/geometry/image: an image is not supported.*--ignore image": [shape("<image><uri>x.png</uri></image>")]
+        "/geometry/image: an image is not supported.*--ignore image": [
+            shape("<image><uri>x.png</uri></image>")
+        ]
     },
     "friction or damping": {
-        "/mu: friction must not be negative, found -1": [surface("<friction><ode><mu>-1</mu></ode></friction>")],
+        "/mu: friction must not be negative, found -1": [
+            surface("<friction><ode><mu>-1</mu></ode></friction>")
+        ],
         "/density: a density must be from 0.001": [surface("", "<density>-1</density>")],
         "/collide_bitmask: expected a whole number, found 'x'": [
             surface("<contact><collide_bitmask>x</collide_bitmask></contact>")
         ],
-        "/dynamics: damping must not be negative, found -1": [hinge("<dynamics><damping>-1</damping></dynamics>")],
+        "/dynamics: damping must not be negative, found -1": [
+            hinge("<dynamics><damping>-1</damping></dynamics>")
+        ],
     },
     "joints of type screw": {
         r"/joint\[@name='j'\]: joint type '\w*' is not supported .*--ignore joint": [
@@ -341,28 +432,49 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
             *(two(joint(ends("a", child), "fixed")) for child in ("c", "world")),
             two(joint("<parent>a</parent>", "fixed")),
         ],
-        "<parent> is not a link of this model: '(c|)'$": [two(joint(ends("c", "a"), "fixed")), two(joint("", "fixed"))],
+        "<parent> is not a link of this model: '(c|)'$": [
+            two(joint(ends("c", "a"), "fixed")),
+            two(joint("", "fixed")),
+        ],
         "joins 'a' to itself": [two(joint(ends("a", "a"), "fixed"))],
     },
     "joints that close a loop": {
         r"/model\[@name='m'\]: joints close a loop: \w+ -> ": [
             two(joint(AB, "fixed", "j"), joint(ends("b", "a"), "fixed", "k")),
-            model(links(3) + "".join(joint(ends(f"l{i}", f"l{(i + 1) % 3}"), "fixed", f"j{i}") for i in range(3))),
+            model(
+                links(3)
+                + "".join(
+                    joint(ends(f"l{i}", f"l{(i + 1) % 3}"), "fixed", f"j{i}") for i in range(3)
+                )
+            ),
         ],
         "link 'l2' is the child of two joints": [
-            model(links(3) + joint(ends("l0", "l2"), "fixed", "j") + joint(ends("l1", "l2"), "fixed", "k"))
+            model(
+                links(3)
+                + joint(ends("l0", "l2"), "fixed", "j")
+                + joint(ends("l1", "l2"), "fixed", "k")
+            )
         ],
     },
     "a joint whose axis": {
         "/axis/xyz: the axis has no usable length": [
-            two(joint(f"{AB}<axis><xyz>0 0 0</xyz></axis>", kind)) for kind in ("revolute", "prismatic")
+            two(joint(f"{AB}<axis><xyz>0 0 0</xyz></axis>", kind))
+            for kind in ("revolute", "prismatic")
         ],
-        "/axis/xyz: expected 3 finite numbers, found 'nan 0 0'": [two(joint(f"{AB}<axis><xyz>nan 0 0</xyz></axis>"))],
+        "/axis/xyz: expected 3 finite numbers, found 'nan 0 0'": [
+            two(joint(f"{AB}<axis><xyz>nan 0 0</xyz></axis>"))
+        ],
         "/axis/limit: the lower limit (1|-?inf) is above the upper limit (0|-?inf)": [
             hinge(f"<limit>{limits}</limit>")
-            for limits in ("<lower>1</lower><upper>0</upper>", "<lower>1e20</lower>", "<upper>-1e20</upper>")
+            for limits in (
+                "<lower>1</lower><upper>0</upper>",
+                "<lower>1e20</lower>",
+                "<upper>-1e20</upper>",
+            )
         ],
-        "/limit/lower: expected one finite number, found 'nan'": [hinge("<limit><lower>nan</lower></limit>")],
+        "/limit/lower: expected one finite number, found 'nan'": [
+            hinge("<limit><lower>nan</lower></limit>")
+        ],
     },
     "a universal joint": {
         "/axis2: the two axes of a universal joint must be perpendicular": [
@@ -377,7 +489,9 @@ def cases(rows: dict[str, dict[str, list[bytes]]]) -> list:
     return [
         pytest.param(words, text, id=f"{start[:30]} {number}")
         for start, said in rows.items()
-        for number, (words, text) in enumerate((words, text) for words, texts in said.items() for text in texts)
+        for number, (words, text) in enumerate(
+            (words, text) for words, texts in said.items() for text in texts
+        )
     ]
 
 
@@ -416,7 +530,9 @@ def test_other_versions_of_xml_are_read_or_refused(check, xml):
 @pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "ascii", "utf-8"])
 def test_encodings_of_one_byte_are_read(check, encoding):
     name = "m" if encoding == "ascii" else "Bäume"
-    text = f"<?xml version='1.0' encoding='{encoding}'?>".encode() + model(LINK, name).decode().encode(encoding)
+    text = f"<?xml version='1.0' encoding='{encoding}'?>".encode() + model(
+        LINK, name
+    ).decode().encode(encoding)
     said, _ = check(text)
     assert said.returncode == 0
     assert name in said.stdout

@@ -20,7 +20,9 @@ from tests.world.hostile import LINK, MODEL, model, world
 
 FILE = Path("made.sdf")
 TAG = re.compile(rb"""(?:[^'">]|"[^"]*"|'[^']*')*>""")
-BATCHES = slow(pytest.mark.fuzz, range(int(os.environ.get("DDENV_HOSTILE_BATCHES", "8"))), but=[0, 1])
+BATCHES = slow(
+    pytest.mark.fuzz, range(int(os.environ.get("DDENV_HOSTILE_BATCHES", "8"))), but=[0, 1]
+)
 
 
 def by_expat(text):
@@ -29,7 +31,12 @@ def by_expat(text):
     parser.buffer_text = True
 
     def start(tag, attributes):
-        entry = {"tag": tag, "attributes": attributes, "text": None, "line": parser.CurrentLineNumber}
+        entry = {
+            "tag": tag,
+            "attributes": attributes,
+            "text": None,
+            "line": parser.CurrentLineNumber,
+        }
         entry |= {"start": parser.CurrentByteIndex, "depth": len(open_elements), "children": 0}
         if open_elements:
             open_elements[-1]["children"] += 1
@@ -40,14 +47,22 @@ def by_expat(text):
         entry = open_elements.pop()
         # Of `<a/>` expat may give the start or the end.
         empty = TAG.match(text, entry["start"])
-        entry["end"] = empty.end() if empty[0].endswith(b"/>") else text.index(b">", parser.CurrentByteIndex) + 1
+        entry["end"] = (
+            empty.end()
+            if empty[0].endswith(b"/>")
+            else text.index(b">", parser.CurrentByteIndex) + 1
+        )
 
     def words(data):
         innermost = open_elements[-1]
         if not innermost["children"]:
             innermost["text"] = (innermost["text"] or "") + data
 
-    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, words
+    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = (
+        start,
+        end,
+        words,
+    )
     try:
         parser.Parse(text, True)
     except (expat.ExpatError, LookupError, ValueError):
@@ -63,7 +78,11 @@ def check_as_expat(text):
     found = list(root.iter())
     assert len(found) == len(expected)
     for element, entry in zip(found, expected, strict=True):
-        assert (element.tag, dict(element.attrib), element.text) == (entry["tag"], entry["attributes"], entry["text"])
+        assert (element.tag, dict(element.attrib), element.text) == (
+            entry["tag"],
+            entry["attributes"],
+            entry["text"],
+        )
         assert (element.start, element.end) == (entry["start"], entry["end"])
         # A CR alone ends a line for expat, but not for TinyXML2.
         assert b"\r" in text.replace(b"\r\n", b"") or element.line == entry["line"]
@@ -97,7 +116,9 @@ WORDS = st.sampled_from(
 )
 ATTRIBUTES = st.dictionaries(NAMES, st.tuples(st.sampled_from("'\""), WORDS), max_size=3)
 SPACES = st.sampled_from([" ", "\n", "\t ", "\r\n"])
-BESIDE = st.sampled_from(["", "<!-- a - b -->", "<?php x?>", "<!--<b>-->", "<![CDATA[<x>&amp;\r\n]]>"])
+BESIDE = st.sampled_from(
+    ["", "<!-- a - b -->", "<?php x?>", "<!--<b>-->", "<![CDATA[<x>&amp;\r\n]]>"]
+)
 
 
 @st.composite
@@ -107,10 +128,13 @@ def elements(draw, depth=0):
     given = draw(ATTRIBUTES)
     equals = draw(st.sampled_from(["=", " = "]))
     inner = "".join(
-        f"{space}{key}{equals}{quote}{words.replace(quote, '')}{quote}" for key, (quote, words) in given.items()
+        f"{space}{key}{equals}{quote}{words.replace(quote, '')}{quote}"
+        for key, (quote, words) in given.items()
     )
     count = draw(st.integers(0, 3)) if depth < 3 else 0
-    inside = "".join(draw(WORDS) + draw(BESIDE) + draw(elements(depth + 1)) + draw(WORDS) for _ in range(count))
+    inside = "".join(
+        draw(WORDS) + draw(BESIDE) + draw(elements(depth + 1)) + draw(WORDS) for _ in range(count)
+    )
     inside = inside or draw(WORDS) + draw(BESIDE) + draw(WORDS)
     if not inside:
         return f"<{name}{inner}/>"
@@ -118,7 +142,13 @@ def elements(draw, depth=0):
 
 
 BEFORE = st.sampled_from(
-    ["", "<?xml version='1.0'?>", "<?xml version='1.0' encoding='utf-8'?>\n<!-- c -->", "\n", "<!---->"]
+    [
+        "",
+        "<?xml version='1.0'?>",
+        "<?xml version='1.0' encoding='utf-8'?>\n<!-- c -->",
+        "\n",
+        "<!---->",
+    ]
 )
 
 
@@ -141,7 +171,11 @@ TOLERATED = {
     "dashes in a comment": ("<!-- a -- b --->", "", ""),
     "a prefix without a declaration": ("", "<gz:policies gz:x='1'/>", ""),
     "a blank line before the declaration": ("\n <?xml version='1.0'?>", "", ""),
-    "a declaration of an encoding that it has not": ("<?xml version='1.0' encoding='UTF-16'?>", "", ""),
+    "a declaration of an encoding that it has not": (
+        "<?xml version='1.0' encoding='UTF-16'?>",
+        "",
+        "",
+    ),
     "a bare ampersand": ("", "<plugin name='p' filename='a&b'>x & y &nbsp; &#xZ;</plugin>", ""),
     "a less-than sign in an attribute": ("", "<plugin name='a<b' filename='f'/>", ""),
     "the end of CDATA in a text": ("", "<plugin name='p' filename='f'>]]></plugin>", ""),
@@ -259,14 +293,21 @@ def test_nothing_but_a_refusal_in_one_line_comes_of_any_text(batch):
     @given(pieces=st.lists(PIECES, max_size=40), inside=st.binary(max_size=4))
     @example(pieces=[b"<?xml encoding='undefined'?><a/>"], inside=b"")
     def check(pieces, inside):
-        for text in (b"".join(pieces), model(LINK) + b"".join(pieces), b"<a>" + b"".join(pieces) + inside + b"</a>"):
+        for text in (
+            b"".join(pieces),
+            model(LINK) + b"".join(pieces),
+            b"<a>" + b"".join(pieces) + inside + b"</a>",
+        ):
             try:
                 root = parse(text, FILE)
             except UserError as error:
                 assert str(error).isprintable() and str(error).startswith(str(FILE))
             else:
                 for element in root.iter():
-                    assert text.startswith(b"<", element.start) and text[element.end - 1 : element.end] == b">"
+                    assert (
+                        text.startswith(b"<", element.start)
+                        and text[element.end - 1 : element.end] == b">"
+                    )
                 strict_fault(text)
                 check_as_expat(text)
 

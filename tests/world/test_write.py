@@ -26,7 +26,9 @@ def test_only_whole_lines_go(removed):
     lines = DITCH.text.split(b"\n")
     assert text == b"\n".join(line for number, line in enumerate(lines) if number not in gone)
     left = [model for model in DITCH.models if model.name not in removed]
-    assert [model.links for model in parse_world(text, DITCH.path).models] == [model.links for model in left]
+    assert [model.links for model in parse_world(text, DITCH.path).models] == [
+        model.links for model in left
+    ]
 
 
 def _line(index):
@@ -35,8 +37,13 @@ def _line(index):
 
 def test_models_on_one_line_leave_the_rest_of_it():
     one, two = (f"<model name='{name}'><link name='l'/></model>" for name in "ab")
-    world = parse_world(f"<sdf version='1.9'><world name='w'>{one} {two}</world></sdf>".encode(), DATA)
-    assert without(world, frozenset("a")) == f"<sdf version='1.9'><world name='w'> {two}</world></sdf>".encode()
+    world = parse_world(
+        f"<sdf version='1.9'><world name='w'>{one} {two}</world></sdf>".encode(), DATA
+    )
+    assert (
+        without(world, frozenset("a"))
+        == f"<sdf version='1.9'><world name='w'> {two}</world></sdf>".encode()
+    )
 
 
 def test_unknown_models_are_refused():

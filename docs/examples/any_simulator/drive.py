@@ -51,7 +51,9 @@ def main():
     noise, there = random.Random(int(seed)), obstacles(world)
     print("t,x,y,z,qx,qy,qz,qw")
     for step in range(round(float(os.environ["DDENV_TIMEOUT"]) / STEP) + 1):
-        print(f"{step * STEP:.2f},{x:.4f},{y:.4f},{z:.4f},0,0,{math.sin(yaw / 2):.6f},{math.cos(yaw / 2):.6f}")
+        print(
+            f"{step * STEP:.2f},{x:.4f},{y:.4f},{z:.4f},0,0,{math.sin(yaw / 2):.6f},{math.cos(yaw / 2):.6f}"
+        )
         if math.hypot(goal_x - x, goal_y - y) <= tolerance:
             return 0
         yaw = math.atan2(goal_y - y, goal_x - x) + noise.gauss(0, NOISE)

@@ -25,13 +25,20 @@ import ddenv
 
 HERE = Path(__file__).parent
 PERIOD = 0.1  # between two rows, s
-UPPER_ARM, FOREARM, HAND, SHOULDER = 0.40, 0.35, 0.082, 0.95  # lengths, and the height of the shoulder, m
+UPPER_ARM, FOREARM, HAND, SHOULDER = (
+    0.40,
+    0.35,
+    0.082,
+    0.95,
+)  # lengths, and the height of the shoulder, m
 # The hand's way, straight from one place to the next: when it shall be where, s and m.
 VIA = ((1.0, (0.33, -0.10, 0.95)), (2.0, (0.33, 0.0, 0.835)), (4.0, (0.74, 0.0, 0.835)))
 STIFFNESS = 400.0  # of each joint, 1/s^2
 ZERO = math.radians(0.4)  # how far the zero of a joint's encoder is off, standard deviation
 CONTACT = MultibodyPlantConfig(time_step=0.01, contact_model="hydroelastic_with_fallback")
-SURFACES = SceneGraphConfig(default_proximity_properties=DefaultProximityProperties(compliance_type="compliant"))
+SURFACES = SceneGraphConfig(
+    default_proximity_properties=DefaultProximityProperties(compliance_type="compliant")
+)
 
 
 def joints(x: float, y: float, z: float) -> list[float]:
@@ -49,7 +56,9 @@ def way(start: np.ndarray, off: np.ndarray) -> PiecewisePolynomial:
     fine = np.linspace(times[0], times[-1], 13)
     hand = [np.interp(fine, times, along) for along in zip(*places, strict=True)]
     angles = [start, *(joints(*place) for place in zip(*hand, strict=True))]
-    return PiecewisePolynomial.CubicShapePreserving([0.0, *fine], np.transpose(angles) + off[:, None], True)
+    return PiecewisePolynomial.CubicShapePreserving(
+        [0.0, *fine], np.transpose(angles) + off[:, None], True
+    )
 
 
 def with_hand(plant: MultibodyPlant) -> RigidBody:
@@ -98,7 +107,9 @@ class Reach:
         simulator = Simulator(builder.Build())
         context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
         plant.SetPositions(context, arm, start + off)
-        bodies = {f"arm::{body.name()}": body for body in map(plant.get_body, plant.GetBodyIndices(arm))}
+        bodies = {
+            f"arm::{body.name()}": body for body in map(plant.get_body, plant.GetBodyIndices(arm))
+        }
         free = map(plant.get_body, sorted(plant.GetFloatingBaseBodies()))
         bodies |= {plant.GetModelInstanceName(body.model_instance()): body for body in free}
         for time in np.arange(0, timeout + PERIOD / 2, PERIOD):

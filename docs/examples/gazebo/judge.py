@@ -25,7 +25,19 @@ def take(message):
             place, turn = one.transform.translation, one.transform.rotation
             time = nav.get_clock().now().nanoseconds * 1e-9 - start
             last = time, place.x, place.y
-            print(time, place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w, sep=",", file=log, flush=True)
+            print(
+                time,
+                place.x,
+                place.y,
+                place.z,
+                turn.x,
+                turn.y,
+                turn.z,
+                turn.w,
+                sep=",",
+                file=log,
+                flush=True,
+            )
 
 
 nav.create_subscription(TFMessage, "/truth", take, 10)

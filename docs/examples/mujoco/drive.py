@@ -68,8 +68,16 @@ class Simulation:
         self._spin = model.jnt_dofadr[model.body_jntadr[base]] + 3
         self._wheels = [model.joint(named(0, name)).dofadr[0] for name in parts.drive.joints]
         self._signs = np.array(parts.drive.signs)
-        moving = [(number, each) for number, each in enumerate(parts.world.models, start=1) if not each.static]
-        self._links = [model.body(named(number, link.name)).id for number, each in moving for link in each.links]
+        moving = [
+            (number, each)
+            for number, each in enumerate(parts.world.models, start=1)
+            if not each.static
+        ]
+        self._links = [
+            model.body(named(number, link.name)).id
+            for number, each in moving
+            for link in each.links
+        ]
 
     def advance(self, steps: int, speeds: np.ndarray) -> None:
         """Simulates `steps` of the clock with the joint speeds that the wheels shall have, rad/s. Raises Broken."""
@@ -98,7 +106,9 @@ class Simulation:
 
     def links(self) -> tuple[np.ndarray, np.ndarray]:
         """Places (L, 3) m and rotations (L, 3, 3) of the links of all models that can move, in the order of the world."""
-        return self._data.xpos[self._links].copy(), self._data.xmat[self._links].reshape(-1, 3, 3).copy()
+        return self._data.xpos[self._links].copy(), self._data.xmat[self._links].reshape(
+            -1, 3, 3
+        ).copy()
 
 
 def drive(parts: Parts, seed: int) -> Iterator[tuple[float, tuple[float, ...]]]:
@@ -141,7 +151,9 @@ class MuJoCo:
         # Once for all tests.
         import mujoco  # noqa: F401
 
-    def run(self, world: SubWorld, seed: int, timeout: float) -> Iterator[tuple[float, tuple[float, ...]]]:
+    def run(
+        self, world: SubWorld, seed: int, timeout: float
+    ) -> Iterator[tuple[float, tuple[float, ...]]]:
         return drive(Parts(world.scenario), seed)
 
 

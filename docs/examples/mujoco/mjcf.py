@@ -47,7 +47,9 @@ def mjcf(world: World, robot: Model, start: Pose, drive: Drive, gain: float, ste
     """
     models = (robot, *world.models)
     file = Writer([one.mu for model in models for one in model.collisions])
-    option = SubElement(file.root, "option", timestep=text(step), gravity=text(*world.gravity), **OPTIONS)
+    option = SubElement(
+        file.root, "option", timestep=text(step), gravity=text(*world.gravity), **OPTIONS
+    )
     # With several contacts of a pair of shapes, a wheel on the edge of a box is pushed back from the box's side.
     SubElement(option, "flag", multiccd="disable")
     for number, model in enumerate(models):
@@ -77,13 +79,17 @@ class Writer:
 
     def __init__(self, frictions: Sequence[float]) -> None:
         self.root = Element("mujoco")
-        SubElement(self.root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
+        SubElement(
+            self.root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false"
+        )
         self._assets = SubElement(self.root, "asset")
         self._world = SubElement(self.root, "worldbody")
         self._contact = SubElement(self.root, "contact")
         # Of two surfaces MuJoCo takes the friction of the one with the higher priority. Gazebo's ODE takes the smaller one: so the
         # smoother a surface, the higher its priority.
-        self._priority = {mu: number for number, mu in enumerate(sorted(set(frictions), reverse=True))}
+        self._priority = {
+            mu: number for number, mu in enumerate(sorted(set(frictions), reverse=True))
+        }
 
     def add_static(self, model: Model) -> None:
         for collision in model.collisions:
@@ -114,7 +120,10 @@ class Writer:
                     SubElement(self._contact, "exclude", body1=one, body2=other)
 
     def _add_shape(self, body: Element, collision: Collision, frame: Pose) -> None:
-        shape = {"friction": text(collision.mu, 0, 0), "priority": str(self._priority[collision.mu])}
+        shape = {
+            "friction": text(collision.mu, 0, 0),
+            "priority": str(self._priority[collision.mu]),
+        }
         SubElement(body, "geom", **self._shape(collision), **at(frame @ collision.pose), **shape)
 
     def _shape(self, collision: Collision) -> dict[str, str]:
@@ -152,7 +161,9 @@ def in_order(model: Model) -> Iterator[tuple[Link, Link | None, Joint | None]]:
     waiting = list(model.links)
     done: set[str] = {"world"}
     while waiting:
-        ready = [link for link in waiting if link.name not in joints or joints[link.name].parent in done]
+        ready = [
+            link for link in waiting if link.name not in joints or joints[link.name].parent in done
+        ]
         if not ready:
             raise Unsupported(f"'{model.name}': its joints form a loop")
         for link in ready:
@@ -179,11 +190,28 @@ def add_joints(body: Element, joint: Joint, link: Link, name: str) -> None:
         raise Unsupported(f"joint '{joint.name}': this example has no {joint.kind} joints")
     kind = "slide" if joint.kind == "prismatic" else "hinge"
     limits = {}
-    if joint.kind in ("revolute", "prismatic") and (joint.lower > -ENDLESS or joint.upper < ENDLESS):
+    if joint.kind in ("revolute", "prismatic") and (
+        joint.lower > -ENDLESS or joint.upper < ENDLESS
+    ):
         limits["range"] = text(max(joint.lower, -ENDLESS), min(joint.upper, ENDLESS))
-    SubElement(body, "joint", type=kind, name=name, axis=text(*frame.rotate(joint.axis)), **limits, **common)
+    SubElement(
+        body,
+        "joint",
+        type=kind,
+        name=name,
+        axis=text(*frame.rotate(joint.axis)),
+        **limits,
+        **common,
+    )
     if joint.axis2 is not None:
-        SubElement(body, "joint", type=kind, name=f"{name} 2", axis=text(*frame.rotate(joint.axis2)), **common)
+        SubElement(
+            body,
+            "joint",
+            type=kind,
+            name=f"{name} 2",
+            axis=text(*frame.rotate(joint.axis2)),
+            **common,
+        )
 
 
 def add_inertia(body: Element, link: Link) -> None:
@@ -193,4 +221,10 @@ def add_inertia(body: Element, link: Link) -> None:
     turn = place.rotation()
     own = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
     full = (own[0, 0], own[1, 1], own[2, 2], own[0, 1], own[0, 2], own[1, 2])
-    SubElement(body, "inertial", pos=text(*place.position), mass=text(link.inertia.mass), fullinertia=text(*full))
+    SubElement(
+        body,
+        "inertial",
+        pos=text(*place.position),
+        mass=text(link.inertia.mass),
+        fullinertia=text(*full),
+    )

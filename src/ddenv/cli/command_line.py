@@ -45,7 +45,9 @@ class Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = getattr(import_module(f"ddenv.cli.{COMMANDS[cmd_name]}"), f"{cmd_name}_command")
+        command: click.Command = getattr(
+            import_module(f"ddenv.cli.{COMMANDS[cmd_name]}"), f"{cmd_name}_command"
+        )
         return command
 
     def resolve_command(
@@ -56,11 +58,19 @@ class Commands(click.Group):
             return super().resolve_command(ctx, args)
         # While a line is typed, the shell only asks what can follow.
         path = Path(word)
-        if not (ctx.resilient_parsing or path.suffix or len(path.parts) > 1 or path.exists() or named(word)):
+        if not (
+            ctx.resilient_parsing
+            or path.suffix
+            or len(path.parts) > 1
+            or path.exists()
+            or named(word)
+        ):
             from ddenv.world.load import bundled_names
 
             known = [*self.list_commands(ctx), *bundled_names()]
-            raise UserError(f"no command, run, scenario or world '{word}'{nearest(word, known)}; see 'ddenv --help'")
+            raise UserError(
+                f"no command, run, scenario or world '{word}'{nearest(word, known)}; see 'ddenv --help'"
+            )
         return "open", self.get_command(ctx, "open"), args
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
@@ -71,7 +81,11 @@ class Commands(click.Group):
         return [*commands, *(each for each in others if each.type == "plain" or not commands)]
 
 
-@click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=Commands,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(__version__)
 @reading_options
 @fetch_option
@@ -85,11 +99,15 @@ def app(context: click.Context, /, **reading: Any) -> None:
         from ddenv.workbench.launch import run_workbench
 
         if reading.pop("fetch"):
-            raise UserError("--fetch: name the world that lacks models; in the workbench, f beside them does the same")
+            raise UserError(
+                "--fetch: name the world that lacks models; in the workbench, f beside them does the same"
+            )
         context.exit(run_workbench(reading=given_reading(reading)))
     context.obj = reading
     if any(reading.values()) and context.invoked_subcommand != "open":
-        raise UserError(f"options for reading worlds go after the command: ddenv {context.invoked_subcommand} ...")
+        raise UserError(
+            f"options for reading worlds go after the command: ddenv {context.invoked_subcommand} ..."
+        )
 
 
 def main() -> None:
@@ -123,17 +141,23 @@ def _told(error: Exception, all_of_it: bool) -> int:
         if isinstance(error, click.NoSuchOption) and error.possibilities:
             # Only those that are really like a mistyped one: their dashes alone make short ones alike.
             word = error.option_name.lstrip("-")
-            like = [each for each in error.possibilities if get_close_matches(word, [each.lstrip("-")])]
+            like = [
+                each for each in error.possibilities if get_close_matches(word, [each.lstrip("-")])
+            ]
             error = click.NoSuchOption(error.option_name, possibilities=like)
         command = "ddenv" if context is None else context.command_path
         announce(f"ddenv: {error.format_message().rstrip('.')}; see '{command} --help'")
-    elif isinstance(error, OSError) and (isinstance(error, BrokenPipeError) or error.filename is None):
+    elif isinstance(error, OSError) and (
+        isinstance(error, BrokenPipeError) or error.filename is None
+    ):
         # Nobody reads the output any more (as with `| head`), or a disk is full. Else Python tries to write the rest at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if isinstance(error, BrokenPipeError):
             return 1
         print(f"ddenv: cannot print: {error.strerror}", file=sys.stderr)
-    elif isinstance(error, MemoryError) or (isinstance(error, ImportError) and "failed to map" in str(error)):
+    elif isinstance(error, MemoryError) or (
+        isinstance(error, ImportError) and "failed to map" in str(error)
+    ):
         # A library that does not fit cannot be imported.
         announce("ddenv: out of memory; 'ulimit -v' says how much a process may use")
     elif all_of_it:

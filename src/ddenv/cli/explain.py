@@ -40,7 +40,9 @@ def why_command(run: str, as_json: bool) -> int:
         found = () if passing is not None and certificate is None else reasons(file, state)
     if as_json:
         said = [asdict(each) | {"words": sentence(each)} for each in found]
-        print(json.dumps({"reasons": said, "nearest": None if passing is None else asdict(passing)}))
+        print(
+            json.dumps({"reasons": said, "nearest": None if passing is None else asdict(passing)})
+        )
         return 0
     for each in found:
         say(f"{sentence(each)} {parting_sentence(each)}".rstrip(), "- ")
@@ -59,11 +61,22 @@ def why_command(run: str, as_json: bool) -> int:
     metavar="N",
     help="Minimum number of fresh runs of the world that passes; 20 by default.",
 )
-@click.option("--again", is_flag=True, help="Search again even if the nearest world that passes is known.")
-@click.option("--give-up", is_flag=True, help="End an interrupted search; the run is left as it was before.")
+@click.option(
+    "--again", is_flag=True, help="Search again even if the nearest world that passes is known."
+)
+@click.option(
+    "--give-up", is_flag=True, help="End an interrupted search; the run is left as it was before."
+)
 @options.engine_options
 def isolate_command(
-    run: str, runs: int | None, again: bool, give_up: bool, jobs: int, cluster: str | None, trust: bool, as_json: bool
+    run: str,
+    runs: int | None,
+    again: bool,
+    give_up: bool,
+    jobs: int,
+    cluster: str | None,
+    trust: bool,
+    as_json: bool,
 ) -> int:
     """Finds the nearest world that passes: as few models removed from the whole world of RUN (a name or a file) as it takes for the
     robot to reach its goal. It changes nothing else.
@@ -78,7 +91,9 @@ def isolate_command(
     path, state = idle_run(run, trust, cluster)
     if give_up:
         if state.isolating is None:
-            raise UserError(f"{path}: no search for the nearest world that passes is open: nothing to give up")
+            raise UserError(
+                f"{path}: no search for the nearest world that passes is open: nothing to give up"
+            )
         follow(path, start_engine(path, 1, give_up="yes"), as_json)
         return 0
     if why := Isolate(again=True).refusal(Situation(state, "absent")):
@@ -88,7 +103,9 @@ def isolate_command(
             follow(path, start_engine(path, jobs, isolate=runs or 0, cluster=cluster), as_json)
         except Interrupted as interrupted:
             if interrupted.state.isolating is not None or interrupted.state.isolated is None:
-                announce(f"interrupted; continue with: ddenv isolate {attach_name(path)}, or end it with --give-up")
+                announce(
+                    f"interrupted; continue with: ddenv isolate {attach_name(path)}, or end it with --give-up"
+                )
                 return 130
     with RunFile(path) as file:
         state = fold(file.events())
@@ -115,8 +132,15 @@ def isolate_command(
     help="Only numbers whose names match, such as green_patch_01.friction, '*.y' or controller.speed; may be repeated. "
     "Without it the most promising ones come first.",
 )
-@click.option("--budget", type=options.Whole(1), metavar="N", help="Maximum number of runs; 300 by default.")
-@click.option("--list", "listed", is_flag=True, help="Only list the numbers and the range in which each is tried.")
+@click.option(
+    "--budget", type=options.Whole(1), metavar="N", help="Maximum number of runs; 300 by default."
+)
+@click.option(
+    "--list",
+    "listed",
+    is_flag=True,
+    help="Only list the numbers and the range in which each is tried.",
+)
 @options.engine_options
 def margins_command(
     run: str,
@@ -148,7 +172,9 @@ def margins_command(
         numbers = numbers_left(read_parts(file), state, globs)
     if listed:
         for one in numbers:
-            say(f"{one.name}: {one.now:.4g}, tried from {one.low:.4g} to {one.high:.4g} {one.unit}".rstrip())
+            say(
+                f"{one.name}: {one.now:.4g}, tried from {one.low:.4g} to {one.high:.4g} {one.unit}".rstrip()
+            )
         return 0
     goes_on = state.margining is not None and not globs and budget is None
     asked = {} if goes_on else {"margins": json.dumps(globs), "most_runs": budget or BUDGET}
@@ -163,7 +189,9 @@ def margins_command(
     if margins is None or margins.broken_off:
         raise UserError(last_words(path))
     if not margins.ended:
-        raise UserError(f"{path}: the search for margins was stopped; continue with: ddenv margins {path}")
+        raise UserError(
+            f"{path}: the search for margins was stopped; continue with: ddenv margins {path}"
+        )
     if as_json:
         found = [asdict(one.margin) | {"words": one.sentence} for one in rows(margins)]
         fixes = [asdict(one) for one in fixes_of(margins)]

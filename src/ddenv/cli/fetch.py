@@ -26,9 +26,16 @@ def fetch_with_bar(file: Path, reading: Reading, parse: Parse) -> None:
 
     from ddenv.runs.fetching import fetch_missing
 
-    columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TransferSpeedColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        DownloadColumn(),
+        TransferSpeedColumn(),
+    )
     console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bars:
+    with Progress(
+        *columns, console=console, transient=True, disable=not sys.stderr.isatty()
+    ) as bars:
 
         def bar_of(model: FuelModel) -> Shown:
             bar = bars.add_task(escape(printable(model.name)), total=None)

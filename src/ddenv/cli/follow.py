@@ -36,7 +36,9 @@ class Interrupted(Exception):
     state: RunState
 
 
-def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> tuple[int, RunState]:
+def follow_to_summary(
+    path: Path, engine: subprocess.Popen[bytes], as_json: bool
+) -> tuple[int, RunState]:
     """Prints what happens and the result, as one JSON object if asked; returns the exit code and the last state."""
     try:
         state = follow(path, engine, as_json)
@@ -51,7 +53,10 @@ def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool
         for line in summary_lines(state, path):
             say(line)
     if code == 130:
-        print(printable(f"interrupted; continue with: ddenv resume {attach_name(path)}"), file=sys.stderr)
+        print(
+            printable(f"interrupted; continue with: ddenv resume {attach_name(path)}"),
+            file=sys.stderr,
+        )
     return code, state
 
 

@@ -19,13 +19,34 @@ if TYPE_CHECKING:
 @click.argument("lesson", metavar="[LESSON_OR_RUN]", required=False)
 @click.argument("runs", metavar="[RUN]...", nargs=-1)
 @click.option("--list", "listed", is_flag=True, help="List the lessons and your progress.")
-@click.option("--check", type=Path, metavar="FILE", help="Check a lesson of your own and print its mistakes.")
-@click.option("--new", type=Path, metavar="FILE", help="Write a lesson to start from; --run is the run it shows.")
-@click.option("--run", type=str, metavar="RUN", help="The run for --new: it is copied beside the lesson.")
-@click.option("--race", is_flag=True, help="Compare two to four runs of one world side by side, test by test.")
-@click.option("--page", type=Path, metavar="FILE", help="Write the lesson's summary as one HTML page to hand out.")
+@click.option(
+    "--check", type=Path, metavar="FILE", help="Check a lesson of your own and print its mistakes."
+)
+@click.option(
+    "--new",
+    type=Path,
+    metavar="FILE",
+    help="Write a lesson to start from; --run is the run it shows.",
+)
+@click.option(
+    "--run", type=str, metavar="RUN", help="The run for --new: it is copied beside the lesson."
+)
+@click.option(
+    "--race", is_flag=True, help="Compare two to four runs of one world side by side, test by test."
+)
+@click.option(
+    "--page",
+    type=Path,
+    metavar="FILE",
+    help="Write the lesson's summary as one HTML page to hand out.",
+)
 def learn_command(
-    lesson: str | None, runs: tuple[str, ...], check: Path | None, new: Path | None, run: str | None, **given: Any
+    lesson: str | None,
+    runs: tuple[str, ...],
+    check: Path | None,
+    new: Path | None,
+    run: str | None,
+    **given: Any,
 ) -> int:
     """Lessons on delta debugging, on recorded runs: step by step, with predictions and questions. They need no Drake.
 
@@ -33,7 +54,13 @@ def learn_command(
     """
     from ddenv.learn.shelf import open_lesson, write_template
 
-    given = {"list": given["listed"], "check": check, "new": new, "race": given["race"], "page": given["page"]}
+    given = {
+        "list": given["listed"],
+        "check": check,
+        "new": new,
+        "race": given["race"],
+        "page": given["page"],
+    }
     asked = [f"--{name}" for name, value in given.items() if value]
     if len(asked) > 1:
         raise UserError(f"{' and '.join(asked)}: give one of them")
@@ -47,7 +74,9 @@ def learn_command(
         _list()
     elif check is not None:
         opened = open_lesson(check)
-        print(f"{check}: {len(opened.lesson.steps)} steps, {opened.asked} questions, no mistake found")
+        print(
+            f"{check}: {len(opened.lesson.steps)} steps, {opened.asked} questions, no mistake found"
+        )
     elif new is not None:
         if run is None:
             raise UserError("--new: needs the run that the lesson shows, such as --run ditch-1")
@@ -66,7 +95,9 @@ def _list() -> None:
     scores = all_scores()
     for number, file in enumerate(bundled(), 1):
         lesson = glance(file)
-        print(f"{number}  {lesson.title} ({lesson.minutes} min): {in_words(scores.get(lesson.name))}")
+        print(
+            f"{number}  {lesson.title} ({lesson.minutes} min): {in_words(scores.get(lesson.name))}"
+        )
 
 
 def _race(names: list[str]) -> int:
@@ -116,7 +147,9 @@ def _open(name: str | None) -> int:
         # Opened before the screen, so that a mistake in it is one line in the terminal.
         open_lesson(lesson)
     if path is not None and not path.is_file():
-        raise UserError(f"no lesson or run {name!r}; 'ddenv learn --list' and 'ddenv runs' list them")
+        raise UserError(
+            f"no lesson or run {name!r}; 'ddenv learn --list' and 'ddenv runs' list them"
+        )
 
     def screen() -> Screen[Any]:
         from ddenv.workbench.learn.lesson_screen import LessonScreen

@@ -36,7 +36,13 @@ def runs_command() -> int:
         print(f"no runs yet in {runs_folder()}; 'ddenv run ditch' makes one")
     width = max((len(run.path.stem) for run in found), default=0)
     for run in found:
-        status = "minimal" if run.minimal else "engine not running" if run.status == "lost" else run.status
+        status = (
+            "minimal"
+            if run.minimal
+            else "engine not running"
+            if run.status == "lost"
+            else run.status
+        )
         size = f"{len(run.kept)} of {run.total} models"
         says = run.trouble or f"{status:<18}  {size:<20}  {run.tests} tests"
         print(printable(f"{run.path.stem:<{width}}  {says}"))
@@ -55,8 +61,12 @@ def diff_command(first: str, second: str, as_json: bool) -> int:
     from ddenv.runs.comparison import as_recent, compared, unlike
     from ddenv.runs.subject import open_subject
 
-    subjects = [open_subject(name, dict.fromkeys(("spawn", "goal", "world"))) for name in (first, second)]
-    one, other = (as_recent(name, each) for name, each in zip((first, second), subjects, strict=True))
+    subjects = [
+        open_subject(name, dict.fromkeys(("spawn", "goal", "world"))) for name in (first, second)
+    ]
+    one, other = (
+        as_recent(name, each) for name, each in zip((first, second), subjects, strict=True)
+    )
     models = unlike(subjects[0].world, subjects[1].world)
     rows = [row for row in (*compared(one, other), *models) if row[1] != row[2]]
     if as_json:
@@ -106,7 +116,10 @@ def config_command(example: bool) -> int:
 @click.command("doctor")
 @click.argument("run", required=False, shell_complete=runs)
 @click.option(
-    "--repair", type=Path, metavar="COPY", help="Write the readable part of a damaged RUN to COPY; RUN stays unchanged."
+    "--repair",
+    type=Path,
+    metavar="COPY",
+    help="Write the readable part of a damaged RUN to COPY; RUN stays unchanged.",
 )
 @json_option
 def doctor_command(run: str | None, repair: Path | None, as_json: bool) -> int:
@@ -124,11 +137,17 @@ def doctor_command(run: str | None, repair: Path | None, as_json: bool) -> int:
     if run is None:
         found = [*installation(), *terminal(), *machine(), *folder_of_runs()]
     else:
-        found = [*(repaired(find_run(run), repair) if repair is not None else run_health(find_run(run)))]
+        found = [
+            *(repaired(find_run(run), repair) if repair is not None else run_health(find_run(run)))
+        ]
         # Asked about one run, only what is wrong elsewhere is worth a line.
-        found += [finding for finding in (*installation(), *folder_of_runs()) if finding.state == "wrong"]
+        found += [
+            finding for finding in (*installation(), *folder_of_runs()) if finding.state == "wrong"
+        ]
     if as_json:
-        print(json.dumps({"well": is_well(found), "findings": [asdict(finding) for finding in found]}))
+        print(
+            json.dumps({"well": is_well(found), "findings": [asdict(finding) for finding in found]})
+        )
     else:
         print("\n".join(map(printable, finding_lines(found, terminal_columns()))))
     return 0 if is_well(found) else 1
@@ -141,8 +160,14 @@ def finding_lines(found: Iterable[Finding], columns: int | None) -> Iterator[str
     for group, members in groupby(found, key=lambda finding: finding.group):
         yield group
         for finding in members:
-            yield from wrapped(finding.says, columns, f"{SIGNS[finding.state]} {finding.what:<{width}}  ")
+            yield from wrapped(
+                finding.says, columns, f"{SIGNS[finding.state]} {finding.what:<{width}}  "
+            )
             if finding.advice:
                 yield from wrapped(finding.advice, columns, f"  {'':<{width}}  → ")
     wrong, notes = (sum(finding.state == state for finding in found) for state in ("wrong", "note"))
-    yield f"✗ {wrong} wrong" if wrong else "all is well" + (f"; ! {notes} worth a look" if notes else "")
+    yield (
+        f"✗ {wrong} wrong"
+        if wrong
+        else "all is well" + (f"; ! {notes} worth a look" if notes else "")
+    )

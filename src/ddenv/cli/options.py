@@ -25,7 +25,9 @@ Option = Callable[[Command], Command]
 def _offering(*, runs: bool = False, scenarios: bool = False) -> Complete:
     """Offers names of these, and files of this folder; if none of them fits, the shell looks for a path by itself."""
 
-    def complete(context: click.Context, parameter: click.Parameter | None, begun: str) -> list[CompletionItem]:
+    def complete(
+        context: click.Context, parameter: click.Parameter | None, begun: str
+    ) -> list[CompletionItem]:
         known: set[str] = set()
         if runs:
             known.update(path.stem for path in runs_folder().glob(f"*{SUFFIX}"))
@@ -35,7 +37,9 @@ def _offering(*, runs: bool = False, scenarios: bool = False) -> Complete:
             known.update(bundled_names())
         if begun:
             with suppress(OSError):
-                known.update(path.name for path in Path().iterdir() if path.suffix.lower() in OPENED)
+                known.update(
+                    path.name for path in Path().iterdir() if path.suffix.lower() in OPENED
+                )
         found = sorted(name for name in known if name.startswith(begun))
         return [CompletionItem(name) for name in found] or [CompletionItem(begun, type="file")]
 
@@ -65,9 +69,15 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in ever
         except ValueError:
             numbers = ()
         if any(not abs(number) <= FARTHEST for number in numbers):
-            self.fail(f"no number may exceed {FARTHEST:g} in magnitude; found '{value}'", param, ctx)
+            self.fail(
+                f"no number may exceed {FARTHEST:g} in magnitude; found '{value}'", param, ctx
+            )
         if not self.fewest <= len(numbers) <= self.most:
-            self.fail(f"expected {self.name}, such as {','.join(['1.5'] * self.most)}; found '{value}'", param, ctx)
+            self.fail(
+                f"expected {self.name}, such as {','.join(['1.5'] * self.most)}; found '{value}'",
+                param,
+                ctx,
+            )
         return numbers
 
 
@@ -100,13 +110,17 @@ def setting_options(*, only: Iterable[str] = (), without: Iterable[str] = ()) ->
             continue
         words = f"{_sentence(one)}{'; 0: no limit' if one.none else ''}."
         if one.kind is bool:
-            found.append(click.option(f"{one.option}/--no-{one.option[2:]}", default=None, help=words))
+            found.append(
+                click.option(f"{one.option}/--no-{one.option[2:]}", default=None, help=words)
+            )
             continue
         # The range is checked with the scenario, which says what else is allowed; 0 takes back a limit.
         kind = Whole(0) if one.none else one.kind
         shape = None if one.kind is str else "NUMBER"
         words += f" {one.more}" if one.shown == "method" else ""
-        found.append(click.option(one.option, type=kind, metavar="|".join(one.choices) or shape, help=words))
+        found.append(
+            click.option(one.option, type=kind, metavar="|".join(one.choices) or shape, help=words)
+        )
     return together(*found)
 
 
@@ -129,7 +143,9 @@ def jobs_option(what: str = "Tests") -> Option:
 _CLUSTER = SETTINGS["cluster"]
 cluster_option = click.option(_CLUSTER.option, help=f"{_sentence(_CLUSTER)}; unchanged by default.")
 
-json_option = click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print one summary object at the end."
+)
 
 trust_option = click.option(
     "--trust", is_flag=True, help="Start the controller or simulator that comes with the scenario."
@@ -150,16 +166,25 @@ remembered_option = click.option(
 # For commands that take a scenario.
 scenario_options = together(
     click.option(
-        "--spawn", type=Numbers("x,y,z,yaw", 3, 4), help="Where the robot starts, m and rad (for an SDF world)."
+        "--spawn",
+        type=Numbers("x,y,z,yaw", 3, 4),
+        help="Where the robot starts, m and rad (for an SDF world).",
     ),
-    click.option("--goal", type=Numbers("x,y", 2, 2), help="The robot's goal, m (for an SDF world)."),
+    click.option(
+        "--goal", type=Numbers("x,y", 2, 2), help="The robot's goal, m (for an SDF world)."
+    ),
     click.option("--world", type=Path, help="An SDF world to use instead of the scenario's."),
     remembered_option,
 )
 
 # For commands that read an SDF world with references to other files.
 reading_options = together(
-    click.option("--model-path", type=Path, multiple=True, help="A folder of models, searched first; may be repeated."),
+    click.option(
+        "--model-path",
+        type=Path,
+        multiple=True,
+        help="A folder of models, searched first; may be repeated.",
+    ),
     click.option(
         "--stand-in",
         multiple=True,

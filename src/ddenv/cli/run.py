@@ -35,16 +35,26 @@ LONGEST_URI = 80
     is_flag=True,
     help="Reduce failing runs of the baseline themselves, each repeated with its seed, as --accept-rate exact does.",
 )
-@click.option("--protect", multiple=True, metavar="MODEL", help="A model that always stays; may be repeated.")
+@click.option(
+    "--protect", multiple=True, metavar="MODEL", help="A model that always stays; may be repeated."
+)
 @options.jobs_option()
 @click.option("--name", help="Name of the run.")
 @click.option(
-    "--output", type=Path, help="A .ddenv file or a folder for the run; or an .sdf file for the minimal world."
+    "--output",
+    type=Path,
+    help="A .ddenv file or a folder for the run; or an .sdf file for the minimal world.",
 )
 @options.trust_option
 @options.json_option
 def run_command(
-    scenario: str, name: str | None, output: Path | None, jobs: int, trust: bool, as_json: bool, **given: Any
+    scenario: str,
+    name: str | None,
+    output: Path | None,
+    jobs: int,
+    trust: bool,
+    as_json: bool,
+    **given: Any,
 ) -> int:
     """Reduces SCENARIO (ditch, rubble, friction, a YAML file, an SDF world or model directives) without a screen."""
     from ddenv.cli.follow import follow_to_summary
@@ -78,8 +88,14 @@ def announce_needs(sdf: Path, uris: list[str]) -> None:
 
 @click.command("resume")
 @options.run_argument
-@click.option("--mixed", is_flag=True, help="Continue even if other versions or another processor change results.")
-@click.option("--anyway", is_flag=True, help="Continue even if the engine has died again and again.")
+@click.option(
+    "--mixed",
+    is_flag=True,
+    help="Continue even if other versions or another processor change results.",
+)
+@click.option(
+    "--anyway", is_flag=True, help="Continue even if the engine has died again and again."
+)
 @click.option("--again", is_flag=True, help="Repeat all tests in a new run of the same scenario.")
 @options.setting_options(only=(*CHANGEABLE, "timeout"))
 @options.engine_options
@@ -121,7 +137,9 @@ def resume_command(
         if value is not None
     }
     if new and again:
-        raise UserError("--again repeats the tests of the same scenario: leave out the new settings")
+        raise UserError(
+            "--again repeats the tests of the same scenario: leave out the new settings"
+        )
     if timeout is not None and not again:
         raise UserError(
             "--timeout: with another one every run may end elsewhere, so no stored end can be judged again; "
@@ -137,10 +155,17 @@ def resume_command(
                         raise UserError(why)
                     send(file, change)
                 # Going back while no engine works ends in a pause, and without a screen nobody can end it.
-                if any(command.kind == "go_back" for command in file.commands(fold(file.events()).last_command)):
+                if any(
+                    command.kind == "go_back"
+                    for command in file.commands(fold(file.events()).last_command)
+                ):
                     file.send("resume")
     # Without a screen there is nobody to ask.
-    how = {"bits": "mixed" if mixed else "same", "anyway": "yes" if anyway else "no", "accept_mode": "automatic"}
+    how = {
+        "bits": "mixed" if mixed else "same",
+        "anyway": "yes" if anyway else "no",
+        "accept_mode": "automatic",
+    }
     if again:
         if timeout is not None:
             failure = scenario.failure.model_copy(update={"timeout": timeout})
@@ -169,7 +194,13 @@ def resume_command(
 )
 @options.engine_options
 def certify_command(
-    run: str, runs: int | None, certify_rate: float | None, jobs: int, cluster: str | None, trust: bool, as_json: bool
+    run: str,
+    runs: int | None,
+    certify_rate: float | None,
+    jobs: int,
+    cluster: str | None,
+    trust: bool,
+    as_json: bool,
 ) -> int:
     """Certifies what is left of RUN (a name or a file) once more, with fresh seeds; it changes nothing else."""
     from ddenv.cli.follow import follow_to_summary
@@ -185,7 +216,9 @@ def certify_command(
             f"{path}: f is not known yet, so there is nothing to certify; run it first: ddenv resume {path}"
         )
     if state.status != "finished" and not (state.confirming and state.ended):
-        raise UserError(f"{path}: its search has not finished; finish it first: ddenv resume {path}")
+        raise UserError(
+            f"{path}: its search has not finished; finish it first: ddenv resume {path}"
+        )
     at_least = runs or settings(state).baseline_runs
     engine = start_engine(path, jobs, certify=at_least, certify_rate=certify_rate, cluster=cluster)
     return follow_to_summary(path, engine, as_json)[0]

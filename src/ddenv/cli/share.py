@@ -66,7 +66,11 @@ def report_command(run: str, file: Path | None, force: bool) -> int:
     help="With --sdf: change this number, such as green_patch_01.friction, to the nearest value with which the robot reaches its "
     "goal ('ddenv margins RUN' finds it), or to that of NUMBER=VALUE; may be repeated.",
 )
-@click.option("--scenario", type=Path, help="Write a scenario (YAML) that runs the robot in that world; needs --sdf.")
+@click.option(
+    "--scenario",
+    type=Path,
+    help="Write a scenario (YAML) that runs the robot in that world; needs --sdf.",
+)
 @click.option(
     "--bundle",
     type=Path,
@@ -106,8 +110,14 @@ def export_command(
     path = find_run(run)
     if sdf is None and bundle is None and mcap is None and test is None:
         RunFile(path).close()
-        raise UserError("nothing to export: give --sdf FILE, --bundle FOLDER, --mcap FILE or --pytest FOLDER")
-    for given, option in ((scenario is not None, "--scenario"), (passes, "--passes"), (bool(margin), "--margin")):
+        raise UserError(
+            "nothing to export: give --sdf FILE, --bundle FOLDER, --mcap FILE or --pytest FOLDER"
+        )
+    for given, option in (
+        (scenario is not None, "--scenario"),
+        (passes, "--passes"),
+        (bool(margin), "--margin"),
+    ):
         if given and sdf is None:
             raise UserError(f"{option}: needs --sdf FILE")
     if passes and margin:
@@ -123,7 +133,9 @@ def export_command(
         say_written(exported.files)
         announce_needs(sdf, exported.needs)
         if exported.whole:
-            announce("no failure is known yet: this is the whole world; 'ddenv resume RUN' reduces it")
+            announce(
+                "no failure is known yet: this is the whole world; 'ddenv resume RUN' reduces it"
+            )
     return 0
 
 
@@ -143,7 +155,13 @@ def _write_mcap(run: Path, file: Path, trust: bool) -> None:
 
 @click.command("reproduce")
 @options.run_argument
-@click.option("--most", type=options.Whole(1, 10_000), default=60, show_default=True, help="Maximum number of runs.")
+@click.option(
+    "--most",
+    type=options.Whole(1, 10_000),
+    default=60,
+    show_default=True,
+    help="Maximum number of runs.",
+)
 @click.option(
     "--folder",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
@@ -152,7 +170,9 @@ def _write_mcap(run: Path, file: Path, trust: bool) -> None:
 @options.jobs_option("Runs")
 @options.trust_option
 @options.json_option
-def reproduce_command(run: str, most: int, folder: Path | None, jobs: int, trust: bool, as_json: bool) -> int:
+def reproduce_command(
+    run: str, most: int, folder: Path | None, jobs: int, trust: bool, as_json: bool
+) -> int:
     """Runs what is left of RUN (a name or a file) until it is clear whether it still fails at the rate of its certificate.
 
     Exit codes are those of git bisect run: 1 it fails at that rate, 0 it does not (at less than half of it), 125 undecided:

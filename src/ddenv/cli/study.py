@@ -34,7 +34,11 @@ from ddenv.cli.terminal import asking
     help="Algorithms separated by commas, or 'all'.",
 )
 @click.option(
-    "--seeds", type=options.Whole(1, 1000), default=1, show_default=True, help="Seeds per scenario and method."
+    "--seeds",
+    type=options.Whole(1, 1000),
+    default=1,
+    show_default=True,
+    help="Seeds per scenario and method.",
 )
 @options.jobs_option()
 @click.option(
@@ -49,7 +53,9 @@ from ddenv.cli.terminal import asking
 )
 @options.setting_options(without=("pair", "algorithm", "seed", "budget", "timeout", "cluster"))
 @options.trust_option
-def study_command(scenarios: tuple[str, ...], jobs: int, folder: Path, trust: bool, **given: Any) -> int:
+def study_command(
+    scenarios: tuple[str, ...], jobs: int, folder: Path, trust: bool, **given: Any
+) -> int:
     """Makes the paper's tables and figures: reduces each scenario with each pair, and writes the results.
 
     It can be stopped at any time; the same command continues. Each reduction is a run in DIR/runs, for 'ddenv open'.

@@ -5,14 +5,33 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from ddenv.evidence.claims import FreshRuns, current, fresh_runs, helping, is_minimal, never_left_out, only_helping
+from ddenv.evidence.claims import (
+    FreshRuns,
+    current,
+    fresh_runs,
+    helping,
+    is_minimal,
+    never_left_out,
+    only_helping,
+)
 from ddenv.evidence.rates import wilson_interval
 from ddenv.evidence.slices import simulated
 from ddenv.runfile.progress import Node
 from ddenv.runfile.state import RunState, spent
 from ddenv.runs.folder import attach_name
 from ddenv.text import Data, count, first_of, percent, printable
-from ddenv.words.claims import drift, meaning, means, missing, promise, rate, seen, smaller_known, verdict_on, what_ran
+from ddenv.words.claims import (
+    drift,
+    meaning,
+    means,
+    missing,
+    promise,
+    rate,
+    seen,
+    smaller_known,
+    verdict_on,
+    what_ran,
+)
 from ddenv.words.early_stop import why_off
 
 # The maximum number of names in a line, and of models with a line each.
@@ -89,13 +108,18 @@ def certificate(state: RunState) -> Data | None:
         "claims": claims,
         "whole_world": None
         if whole is None
-        else _share(whole.shown, whole.runs) | {"low": whole.low, "high": whole.high, "outcomes": dict(whole.outcomes)},
+        else _share(whole.shown, whole.runs)
+        | {"low": whole.low, "high": whole.high, "outcomes": dict(whole.outcomes)},
     }
 
 
 def _whole_world(state: RunState) -> FreshRuns | None:
     """The certificate's runs of the whole world, if it made any with all seeds of those of what is left."""
-    runs = (each for each in fresh_runs(state) if each.node == 0 and not each.is_left and not each.is_chosen)
+    runs = (
+        each
+        for each in fresh_runs(state)
+        if each.node == 0 and not each.is_left and not each.is_chosen
+    )
     return next((each for each in runs if each.runs), None)
 
 
@@ -109,10 +133,16 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     what = "minimal environment" if state.certified else "environment so far"
     if state.status == "finished" and not state.certified:
         what = f"environment, {f'minimal but for {first_of(helps, 3)}' if helps else 'not shown to be minimal'}"
-    tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
+    tests = ", ".join(
+        f"{number} {outcome}" for outcome, number in state.outcomes().items() if number
+    )
     more = f"; {state.cut_tests} ended early" if state.cut_tests else ""
     more += f"; {state.implied} implied, not simulated" if state.implied else ""
-    more += f"; {state.ahead} started early and not needed" if state.ahead and state.status == "finished" else ""
+    more += (
+        f"; {state.ahead} started early and not needed"
+        if state.ahead and state.status == "finished"
+        else ""
+    )
     names = first_of(state.environment, MOST_NAMES)
     # They say nothing about the failure.
     broken = [test for test in state.tests if test.broke]
@@ -123,7 +153,11 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
         f"{spent(state, state.updated_at):.0f} s",
         *([off] if (off := why_off(state)) else []),
         *([known] if (known := smaller_known(state)) else []),
-        *([f"{count(len(broken), 'test')} broke; the last one: {broken[-1].failure}"] if broken else []),
+        *(
+            [f"{count(len(broken), 'test')} broke; the last one: {broken[-1].failure}"]
+            if broken
+            else []
+        ),
         f"run file: {path}",
     ]
     if state.status == "finished" and found is not None:
@@ -131,7 +165,11 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
         out = f", and H in it leaves {could_go[0]} out" if could_go else ""
         run = attach_name(path)
         bundle = shlex.quote(f"{path.stem}.zip")
-        passing = "" if state.isolated is not None else f"'ddenv isolate {run}' finds a nearest world that passes, "
+        passing = (
+            ""
+            if state.isolated is not None
+            else f"'ddenv isolate {run}' finds a nearest world that passes, "
+        )
         said.append(
             f"next: 'ddenv open {run}' shows it{out}, 'ddenv why {run}' says why it fails, {passing}"
             f"'ddenv export {run} --bundle {bundle}' packs it for others"
@@ -151,7 +189,10 @@ def _certificate_lines(state: RunState) -> list[str]:
         ]
     left, *removals = found.claims
     lines = [f"  what is left: {rate(left)}: {meaning(left, found)}"]
-    lines += [f"  without {one.without}: {rate(one)}: {means(state, found, one)}" for one in removals[:MOST_NAMES]]
+    lines += [
+        f"  without {one.without}: {rate(one)}: {means(state, found, one)}"
+        for one in removals[:MOST_NAMES]
+    ]
     if (more := len(removals) - MOST_NAMES) > 0:
         lines.append(f"  and {count(more, 'more model')}")
     if (whole := _whole_world(state)) is not None:

@@ -36,7 +36,10 @@ def wrapped(text: str, columns: int | None, first: str = "") -> list[str]:
     first += text[: len(text) - len(text.lstrip(" "))]
     lines = Text(" ".join(text.split())).wrap(Console(), max(LEAST, columns - width(first)))
     below = " " * width(first)
-    return [f"{below if number else first}{line.plain.rstrip()}" for number, line in enumerate(lines or [Text()])]
+    return [
+        f"{below if number else first}{line.plain.rstrip()}"
+        for number, line in enumerate(lines or [Text()])
+    ]
 
 
 def say(text: str, first: str = "") -> None:
@@ -51,7 +54,11 @@ def say_written(files: Iterable[object]) -> None:
 
 def announce(line: str) -> None:
     """Says on stderr what is going on, or wrong, so that programs can read stdout."""
-    print("\n".join(wrapped(printable(line), terminal_columns(sys.stderr))), file=sys.stderr, flush=True)
+    print(
+        "\n".join(wrapped(printable(line), terminal_columns(sys.stderr))),
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 def asking(trust: bool) -> Callable[[str], bool]:

@@ -33,23 +33,53 @@ PLANNED = ("minimal", "test", "leave_out", "leave_each_out", "seed", "repeat")
 @click.option("--keep", help="Only these models, by name, separated by commas.")
 @click.option("--minimal", is_flag=True, help="Only the models of the run's environment.")
 @click.option(
-    "--test", type=options.Whole(1), metavar="NUMBER", help="Use the models and the seed of this test of the run."
+    "--test",
+    type=options.Whole(1),
+    metavar="NUMBER",
+    help="Use the models and the seed of this test of the run.",
 )
-@click.option("--leave-out", multiple=True, metavar="MODEL", help="Leave this model out as well; may be repeated.")
+@click.option(
+    "--leave-out",
+    multiple=True,
+    metavar="MODEL",
+    help="Leave this model out as well; may be repeated.",
+)
 @click.option("--leave-each-out", is_flag=True, help="Then leave out each of the models in turn.")
 @click.option(
-    "--margin", multiple=True, metavar="NUMBER[=VALUE]", help="Change a number, as 'ddenv export --margin' does."
+    "--margin",
+    multiple=True,
+    metavar="NUMBER[=VALUE]",
+    help="Change a number, as 'ddenv export --margin' does.",
 )
-@click.option("--seed", type=options.Whole(0, 2**31), help="Seed of the first run; the next ones count up from it.")
-@click.option("--repeat", type=options.Whole(1, 100_000), default=1, show_default=True, help="Number of runs of each.")
 @click.option(
-    "--simulator", type=Path, metavar="FILE", help="Run in this simulator: a YAML file with its name and its command."
+    "--seed",
+    type=options.Whole(0, 2**31),
+    help="Seed of the first run; the next ones count up from it.",
+)
+@click.option(
+    "--repeat",
+    type=options.Whole(1, 100_000),
+    default=1,
+    show_default=True,
+    help="Number of runs of each.",
+)
+@click.option(
+    "--simulator",
+    type=Path,
+    metavar="FILE",
+    help="Run in this simulator: a YAML file with its name and its command.",
 )
 @options.jobs_option("Runs")
 @options.trust_option
 @click.option("--json", "as_json", is_flag=True, help="Print one object with all runs at the end.")
 def test_command(
-    subject: str, keep: str | None, simulator: Path | None, jobs: int, trust: bool, as_json: bool, **given: Any
+    subject: str,
+    keep: str | None,
+    simulator: Path | None,
+    jobs: int,
+    trust: bool,
+    as_json: bool,
+    **given: Any,
 ) -> int:
     """Runs the robot in a scenario, or in a run's world; prints each run's outcome, and at the end how often it fails."""
     from ddenv.engine.single_test import plan, run_trials
@@ -75,7 +105,13 @@ def test_command(
     oracle = what.scenario.oracle
     others = []
     # Without a certificate there is nothing to compare with.
-    if planned["minimal"] and simulator is not None and certificate and oracle and certificate.claims[0].low:
+    if (
+        planned["minimal"]
+        and simulator is not None
+        and certificate
+        and oracle
+        and certificate.claims[0].low
+    ):
         others = elsewhere(results, certificate.claims[0], oracle.name or "this simulator")
     if as_json:
         print(json.dumps({"runs": results, "summary": rows, "elsewhere": others}))
@@ -85,7 +121,9 @@ def test_command(
     return int(not any(row["runs"] for row in rows))
 
 
-def _subject(name: str, given: Mapping[str, Any], simulator: Path | None, trust: bool, robots: ExitStack) -> Subject:
+def _subject(
+    name: str, given: Mapping[str, Any], simulator: Path | None, trust: bool, robots: ExitStack
+) -> Subject:
     """What `name` stands for; in another simulator, if one is given. `robots` keeps the file of a robot that only a run has."""
     from ddenv.engine.single_test import in_simulator
     from ddenv.runs.subject import open_subject, robot_file
@@ -95,7 +133,9 @@ def _subject(name: str, given: Mapping[str, Any], simulator: Path | None, trust:
     another = None if simulator is None else load_simulator(simulator)
     found = open_subject(name, given, announce)
     # Another simulator may start the scenario's own controller.
-    starts = found.scenario if another is None else found.scenario.model_copy(update={"oracle": None})
+    starts = (
+        found.scenario if another is None else found.scenario.model_copy(update={"oracle": None})
+    )
     if found.run is None:
         check_named(starts, name, asking(trust))
     else:
@@ -134,7 +174,13 @@ def summary(results: Sequence[Mapping[str, Any]]) -> list[Data]:
         low, high = wilson_interval(shown, runs) if runs else (None, None)
         row = {"without": without, "models": there[0]["models"], "runs": runs, "shown": shown}
         rows.append(
-            row | {"rate": shown / runs if runs else None, "low": low, "high": high, "outcomes": dict(outcomes)}
+            row
+            | {
+                "rate": shown / runs if runs else None,
+                "low": low,
+                "high": high,
+                "outcomes": dict(outcomes),
+            }
         )
     return rows
 
@@ -147,10 +193,18 @@ def lines(rows: Sequence[Mapping[str, Any]], said: Mapping[str | None, str] = {}
     for row in rows:
         words = said.get(row["without"], "")
         if not words:
-            words = f"without {row['without']}" if row["without"] else f"all {count(row['models'], 'model')}"
+            words = (
+                f"without {row['without']}"
+                if row["without"]
+                else f"all {count(row['models'], 'model')}"
+            )
             share = f"{row['shown']} of {count(row['runs'], 'run')}"
             shown = f"{f'f in {share}' if known else f'{share} failed'}"
-            words += f": {shown} ({percent(row['low'])} to {percent(row['high'])})" if row["runs"] else ": no run ended"
+            words += (
+                f": {shown} ({percent(row['low'])} to {percent(row['high'])})"
+                if row["runs"]
+                else ": no run ended"
+            )
         broke = sum(row["outcomes"].values()) - row["runs"]
         found.append(printable(words + (f"; {count(broke, 'more run')} broke" if broke else "")))
     return found
@@ -169,9 +223,15 @@ def elsewhere(results: Sequence[Mapping[str, Any]], here: Claim, simulator: str)
 
     found = []
     for row in (each for each in summary(results) if each["runs"]):
-        there = replace(here, **{key: row[key] for key in ("without", "shown", "runs", "low", "high")})
+        there = replace(
+            here, **{key: row[key] for key in ("without", "shown", "runs", "low", "high")}
+        )
         if row["without"] is None:
-            ended = (each for each in results if each["without"] is None and each["outcome"] not in BROKEN)
+            ended = (
+                each
+                for each in results
+                if each["without"] is None and each["outcome"] not in BROKEN
+            )
             fails = shows_at((each["outcome"] == "similar" for each in ended), here.low)
             said = in_another_simulator(simulator, fails, there, here)
         else:
@@ -193,7 +253,9 @@ def _needed_there(results: Sequence[Mapping[str, Any]], without: str) -> str:
     left = Environment.whole(2)
     models = {rest: without, left: None}
     shown: dict[tuple[str | None, int], Shown] = {
-        (one["without"], one["seed"]): "broken" if one["outcome"] in BROKEN else one["outcome"] == "similar"
+        (one["without"], one["seed"]): "broken"
+        if one["outcome"] in BROKEN
+        else one["outcome"] == "similar"
         for one in results
     }
     seeds = [seed for model, seed in shown if model is None and (without, seed) in shown]

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ddenv.cli.options import Whole, fetch_option, given_reading, reading_options, runs, runs_and_scenarios
+from ddenv.cli.options import (
+    Whole,
+    fetch_option,
+    given_reading,
+    reading_options,
+    runs,
+    runs_and_scenarios,
+)
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run, named
 
@@ -23,10 +30,18 @@ PORT = 8000
 @click.argument("run", metavar="RUN_OR_FILE", type=click.Path(), shell_complete=runs_and_scenarios)
 @reading_options
 @fetch_option
-@click.option("--watch", is_flag=True, help="Only watch: changes and writes nothing, not even beside RUN.")
-@click.option("--lines", is_flag=True, help="Plain lines that are never redrawn, for screen readers: type help.")
+@click.option(
+    "--watch", is_flag=True, help="Only watch: changes and writes nothing, not even beside RUN."
+)
+@click.option(
+    "--lines",
+    is_flag=True,
+    help="Plain lines that are never redrawn, for screen readers: type help.",
+)
 @click.pass_obj
-def open_command(before: Mapping[str, Any], /, run: str, watch: bool, lines: bool, **reading: Any) -> int:
+def open_command(
+    before: Mapping[str, Any], /, run: str, watch: bool, lines: bool, **reading: Any
+) -> int:
     """Attaches the workbench to a run (its name or file), or opens it on a scenario or an SDF world.
 
     'ddenv RUN_OR_FILE' does the same; options for reading worlds may also stand before RUN_OR_FILE.
@@ -36,7 +51,9 @@ def open_command(before: Mapping[str, Any], /, run: str, watch: bool, lines: boo
     from ddenv.world.access import is_folder
 
     for name, value in before.items():
-        reading[name] = value + reading[name] if isinstance(value, tuple) else reading[name] or value
+        reading[name] = (
+            value + reading[name] if isinstance(value, tuple) else reading[name] or value
+        )
     kind, path = named(run) or ("run", find_run(run))
     if kind == "run" and path.is_file():
         if any(reading.values()):
@@ -76,7 +93,9 @@ def _refuse_host(_: Any, __: Any, value: str | None) -> None:
 
 @click.command("serve")
 @click.argument("run", required=False, shell_complete=runs)
-@click.option("--port", type=Whole(1, 65535), default=PORT, show_default=True, help="Port on 127.0.0.1.")
+@click.option(
+    "--port", type=Whole(1, 65535), default=PORT, show_default=True, help="Port on 127.0.0.1."
+)
 @click.option(
     "--font-size",
     type=Whole(6, 72),

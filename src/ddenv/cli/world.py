@@ -15,7 +15,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ddenv.cli.options import Numbers, fetch_option, reading_options, remembered_option, scenarios, together
+from ddenv.cli.options import (
+    Numbers,
+    fetch_option,
+    reading_options,
+    remembered_option,
+    scenarios,
+    together,
+)
 from ddenv.cli.terminal import announce, say_written, terminal_columns, wrapped
 from ddenv.errors import UserError
 from ddenv.runs.folder import find_run
@@ -40,7 +47,12 @@ WIDEST = 10_000
 
 # A world, as it is read.
 world_argument = together(
-    click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios),
+    click.argument(
+        "file",
+        metavar="FILE_OR_SCENARIO",
+        type=click.Path(path_type=Path),
+        shell_complete=scenarios,
+    ),
     reading_options,
     fetch_option,
     remembered_option,
@@ -77,7 +89,11 @@ def _read(file: Path, options: Data) -> tuple[World, Reading]:
 def check(file: Path, as_json: bool, **reading: Any) -> int:
     """Shows how FILE is read: each model, what was replaced or ignored, and why."""
     world, _ = _read(file, reading)
-    print(json.dumps(world_report(world)) if as_json else "\n".join(world_lines(world, terminal_columns())))
+    print(
+        json.dumps(world_report(world))
+        if as_json
+        else "\n".join(world_lines(world, terminal_columns()))
+    )
     return 0
 
 
@@ -92,7 +108,10 @@ def world_report(world: World) -> Data:
     models = []
     for model in world.models:
         box = model_bounds(model)
-        links = [{"name": link.name, "pose": [*link.pose.position, *link.pose.quaternion]} for link in model.links]
+        links = [
+            {"name": link.name, "pose": [*link.pose.position, *link.pose.quaternion]}
+            for link in model.links
+        ]
         models.append(
             {
                 "name": model.name,
@@ -106,7 +125,8 @@ def world_report(world: World) -> Data:
                 "low": None if box is None else box[0].tolist(),
                 "high": None if box is None else box[1].tolist(),
                 "friction": sorted({collision.mu for collision in model.collisions}),
-                "mass": sum(link.inertia.mass for link in model.links if link.inertia is not None) or None,
+                "mass": sum(link.inertia.mass for link in model.links if link.inertia is not None)
+                or None,
                 "notes": _notes(world, model.name),
             }
         )
@@ -116,18 +136,30 @@ def world_report(world: World) -> Data:
         "world": world.name,
         "gravity": list(world.gravity),
         "models": models,
-        "notes": _notes(world, *({note.model for note in world.notes} - {model.name for model in world.models})),
-        "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
+        "notes": _notes(
+            world, *({note.model for note in world.notes} - {model.name for model in world.models})
+        ),
+        "inside": [
+            {"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)
+        ],
         "pieces": [asdict(error) for error in floor_errors(world.models)],
         "refused": [{"why": why, "place": place} for why, place in refused(world)],
-        "files": [{"uri": file.uri, "path": str(file.path), "from": file.source} for file in world.found],
+        "files": [
+            {"uri": file.uri, "path": str(file.path), "from": file.source} for file in world.found
+        ],
         "absent": list(world.absent),
     }
 
 
 def _notes(world: World, *models: str) -> list[dict[str, str]]:
     return [
-        {"kind": note.kind, "what": note.what, "why": note.why, "detail": note.detail, "place": note.place}
+        {
+            "kind": note.kind,
+            "what": note.what,
+            "why": note.why,
+            "detail": note.detail,
+            "place": note.place,
+        }
         for note in world.notes
         if note.model in models
     ]
@@ -169,7 +201,11 @@ def world_lines(world: World, columns: int | None = None) -> list[str]:
     places: dict[str, list[str]] = {}
     for why, place in refused(world):
         places.setdefault(why, []).append(place)
-    remarks = (*note_inside(world), *note_unseen(world, world.elements()), *note_pieces(world, world.names))
+    remarks = (
+        *note_inside(world),
+        *note_unseen(world, world.elements()),
+        *note_pieces(world, world.names),
+    )
     wrong = [words for _, words in remarks]
     for why, at in places.items():
         more = f", and {len(at) - 1} more" if len(at) > 1 else ""
@@ -198,7 +234,9 @@ def _files(world: World, columns: int | None) -> list[str]:
         found.setdefault(named, {})[file.uri] = None
     lines = [f"{len(uris)} in {where}: {_named(uris)}" for where, uris in found.items()]
     if world.absent:
-        lines.append(f"{len(world.absent)} not found: {_named(world.absent)}{how_to_fetch(world.absent)}")
+        lines.append(
+            f"{len(world.absent)} not found: {_named(world.absent)}{how_to_fetch(world.absent)}"
+        )
     titled = ["", "files"] if lines else []
     return [*titled, *(line for each in lines for line in wrapped(printable(each), columns, "   "))]
 
@@ -250,8 +288,14 @@ def _table(world: World, notes: Mapping[str, Iterable[str]], columns: int | None
         for title in titles:
             table.add_column(title, justify="right" if title in TO_THE_RIGHT else "left")
         for row in found:
-            table.add_row(*(Text(cell) for title, cell in zip(HEADER, row, strict=True) if title in titles))
-        if not spare or Measurement.get(console, console.options.update(width=WIDEST), table).maximum <= console.width:
+            table.add_row(
+                *(Text(cell) for title, cell in zip(HEADER, row, strict=True) if title in titles)
+            )
+        if (
+            not spare
+            or Measurement.get(console, console.options.update(width=WIDEST), table).maximum
+            <= console.width
+        ):
             break
         titles.remove(spare)
     with console.capture() as printed:
@@ -262,10 +306,15 @@ def _table(world: World, notes: Mapping[str, Iterable[str]], columns: int | None
 def _totals(world: World) -> str:
     kinds = Counter(note.kind for note in world.notes)
     said = [f"{kinds[kind]} {kind}" for kind in ("replaced", "ignored") if kinds[kind]]
-    stay = [shortened(model.name, LONGEST_NAME) for model in world.models if model.name in world.anchors]
+    stay = [
+        shortened(model.name, LONGEST_NAME) for model in world.models if model.name in world.anchors
+    ]
     they, them = ("1 stays", "it") if len(stay) == 1 else (f"{len(stay)} stay", "them")
     why = f"; {they} because others depend on {them}: {first_of(stay, MOST_NAMES)}" if stay else ""
-    welds = [f"{shortened(one, LONGEST_NAME)} to {shortened(other, LONGEST_NAME)}" for one, other in world.ties]
+    welds = [
+        f"{shortened(one, LONGEST_NAME)} to {shortened(other, LONGEST_NAME)}"
+        for one, other in world.ties
+    ]
     why += f"; welded, so they are removed together: {first_of(welds, MOST_NAMES)}" if welds else ""
     models = f"{count(len(world.models), 'model')}, {len(world.elements())} can be removed{why}"
     return f"{models}; {', '.join(said) or 'nothing was replaced or ignored'}"
@@ -279,8 +328,16 @@ def _totals(world: World) -> str:
 @click.option("--spawn", type=Numbers("x,y,z,yaw", 2, 4), help="Mark the robot's start, m and rad.")
 @click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark the robot's goal, m.")
 @click.option("--svg", type=Path, help="Write the map to this file instead.")
-@click.option("--took-part", is_flag=True, help="FILE is a run: show what may have affected runs of the whole world.")
-@click.option("--passes", is_flag=True, help="FILE is a run: show the nearest world that passes, and what it lacks.")
+@click.option(
+    "--took-part",
+    is_flag=True,
+    help="FILE is a run: show what may have affected runs of the whole world.",
+)
+@click.option(
+    "--passes",
+    is_flag=True,
+    help="FILE is a run: show the nearest world that passes, and what it lacks.",
+)
 def show(
     file: Path,
     spawn: tuple[float, ...] | None,
@@ -297,7 +354,9 @@ def show(
     if took_part or passes:
         if spawn is not None or goal is not None or svg is not None or (took_part and passes):
             option = "--took-part" if took_part else "--passes"
-            raise UserError(f"{option}: --spawn, --goal, --svg and other views of a run cannot be combined with it")
+            raise UserError(
+                f"{option}: --spawn, --goal, --svg and other views of a run cannot be combined with it"
+            )
         world, dim, below = _of_run(str(file), passes)
         print("\n".join([_map(world, dim=dim), *below]))
         return 0
@@ -340,9 +399,14 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
         return world, frozenset(gone), [head, *(f"  {printable(model)}" for model in gone)]
     times, runs = in_whole_world(state)
     if not times or state.baseline is None:
-        raise UserError(f"{path}: does not record which models affected its runs of the whole world; make a new run")
+        raise UserError(
+            f"{path}: does not record which models affected its runs of the whole world; make a new run"
+        )
     head = f"{count(len(times), 'model')} of {len(state.elements)} may have affected the runs of the whole world:"
-    lines = [f"  {printable(model)}: {number} of {count(runs, 'run')}" for model, number in times.most_common()]
+    lines = [
+        f"  {printable(model)}: {number} of {count(runs, 'run')}"
+        for model, number in times.most_common()
+    ]
     return world, frozenset(world.names) - times.keys(), [head, *lines]
 
 
@@ -352,7 +416,11 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
 @world_command.command()
 @world_argument
 @click.option(
-    "-o", "--output", type=Path, required=True, help="The SDF file to write; meshes go to a folder beside it."
+    "-o",
+    "--output",
+    type=Path,
+    required=True,
+    help="The SDF file to write; meshes go to a folder beside it.",
 )
 def convert(file: Path, output: Path, **reading: Any) -> int:
     """Writes FILE as clean SDF 1.9 that Drake's own parser loads."""
@@ -371,7 +439,9 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
 
     world, read_as = _read(file, reading)
     if is_directives(world.path):
-        raise UserError(f"{world.path}: only SDF worlds can be written settled; 'ddenv world convert' makes one")
+        raise UserError(
+            f"{world.path}: only SDF worlds can be written settled; 'ddenv world convert' makes one"
+        )
     check_drake()
     from ddenv.robot.settled import moved, notes_on
     from ddenv.robot.simulation.template import Variants
@@ -394,10 +464,16 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
     places = {name: links for name, links in settled.places.items() if name not in settled.fallen}
     text, stay = with_places(world, places, read_as)
     write_file(output, text)
-    ways = {name: way for name, way in moved(world, settled).items() if name not in stay and way > 0}
+    ways = {
+        name: way for name, way in moved(world, settled).items() if name not in stay and way > 0
+    }
     farthest = max(ways, key=lambda name: ways[name], default="")
     far = f", {farthest} farthest, by {ways[farthest]:.3f} m" if farthest else ""
-    print(printable(f"wrote {output}: {count(len(ways), 'model')} moved within {settled.seconds:.1f} s{far}"))
+    print(
+        printable(
+            f"wrote {output}: {count(len(ways), 'model')} moved within {settled.seconds:.1f} s{far}"
+        )
+    )
     if stay:
         why = "their parts move, or others depend on them"
         print(printable(f"not moved: {first_of(stay, MOST_NAMES)}: {why}"))

@@ -56,12 +56,17 @@ def terminal_map(
     columns = max(columns, LEAST_COLUMNS)
     rows = max(rows, LEAST_ROWS)
     models = plan(world)
-    low, high = extent([each.outline for each in models], [point[:2] for point in (spawn, goal) if point is not None])
+    low, high = extent(
+        [each.outline for each in models],
+        [point[:2] for point in (spawn, goal) if point is not None],
+    )
     margin = np.maximum(0.3, 0.03 * (high - low))
     low = low - margin
     high = high + margin
     entries = []
-    for sign, each in sorted(zip(signs(models), models, strict=True), key=lambda each: -each[1].outline.area):
+    for sign, each in sorted(
+        zip(signs(models), models, strict=True), key=lambda each: -each[1].outline.area
+    ):
         if each.model.name in dim:
             continue
         x, y, _ = each.center
@@ -80,7 +85,9 @@ def terminal_map(
     if goal is not None:
         title.append(f"G goal ({goal[0]:g}, {goal[1]:g})")
         canvas.put(view.cell(*goal), "G", fore, GOAL if color else None)
-    return "\n".join([shortened(" · ".join(title), columns), *_framed(canvas, view, color), *legend])
+    return "\n".join(
+        [shortened(" · ".join(title), columns), *_framed(canvas, view, color), *legend]
+    )
 
 
 def _view(low: np.ndarray, high: np.ndarray, columns: int, rows: int) -> View:
@@ -90,7 +97,13 @@ def _view(low: np.ndarray, high: np.ndarray, columns: int, rows: int) -> View:
     x, y = ((low + high) / 2).tolist()
     needs = math.ceil(wide / scale - 1e-6)
     need_rows = math.ceil(tall / (2 * scale) - 1e-6)
-    return View(x=x, y=y, scale=scale, columns=min(columns, max(2 * NUMBERS, needs)), rows=min(rows, max(3, need_rows)))
+    return View(
+        x=x,
+        y=y,
+        scale=scale,
+        columns=min(columns, max(2 * NUMBERS, needs)),
+        rows=min(rows, max(3, need_rows)),
+    )
 
 
 # The legend.
@@ -109,8 +122,14 @@ def _legend(entries: Sequence[Entry], columns: int, most: int) -> list[str]:
     cells = [_cell(entry, widths) for entry in shown]
     if more := len(entries) - len(shown):
         cells.append(shortened(f"... and {more} more (--svg FILE names them)", columns))
-    stacks = [[_cell(HEADER, widths), *cells[start : start + lines]] for start in range(0, len(cells), lines)]
-    return [shortened((2 * GAP).join(row).rstrip(), columns) for row in zip_longest(*stacks, fillvalue="")]
+    stacks = [
+        [_cell(HEADER, widths), *cells[start : start + lines]]
+        for start in range(0, len(cells), lines)
+    ]
+    return [
+        shortened((2 * GAP).join(row).rstrip(), columns)
+        for row in zip_longest(*stacks, fillvalue="")
+    ]
 
 
 def _cell(entry: Entry, widths: Sequence[int]) -> str:
@@ -153,7 +172,9 @@ def _escaped(run: Run) -> str:
     """A run in its colours; the terminal's own need no code."""
     grounds = ((38, run.fore), (48, run.back))
     codes = [
-        f"{ground};2;{color >> 16};{color >> 8 & 255};{color & 255}" for ground, color in grounds if color != PLAIN
+        f"{ground};2;{color >> 16};{color >> 8 & 255};{color & 255}"
+        for ground, color in grounds
+        if color != PLAIN
     ]
     codes += ["1"] if run.bold else []
     return f"\x1b[{';'.join(codes)}m{run.text}\x1b[0m" if codes else run.text

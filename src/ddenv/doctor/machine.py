@@ -21,7 +21,13 @@ from ddenv.runs.folder import SUFFIX, runs_folder
 from ddenv.text import count
 
 # By the names that packages are installed as, with the module that shows that they are there.
-NEEDED = {"drake": "pydrake", "textual": "textual", "numpy": "numpy", "scipy": "scipy", "scikit-learn": "sklearn"}
+NEEDED = {
+    "drake": "pydrake",
+    "textual": "textual",
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "scikit-learn": "sklearn",
+}
 SMALLEST = (80, 24)
 # Less free space or memory than this is worth a line, bytes.
 LITTLE_SPACE = 500_000_000
@@ -29,15 +35,30 @@ LITTLE_MEMORY = 1_500_000_000
 
 
 def installation() -> Iterator[Finding]:
-    yield Finding(group="installation", what="ddenv", says=f"{__version__}, {Path(__file__).parents[1]}")
-    yield Finding(group="installation", what="Python", says=f"{platform.python_version()}, {sys.executable}")
+    yield Finding(
+        group="installation", what="ddenv", says=f"{__version__}, {Path(__file__).parents[1]}"
+    )
+    yield Finding(
+        group="installation", what="Python", says=f"{platform.python_version()}, {sys.executable}"
+    )
     for name, module in NEEDED.items():
         if importlib.util.find_spec(module) is not None:
             yield Finding(group="installation", what=name, says=_version(name))
         elif name == "drake" and sys.platform == "win32":
-            yield Finding(group="installation", what=name, says="not for Windows: runs can be viewed here, not made", state="note")
+            yield Finding(
+                group="installation",
+                what=name,
+                says="not for Windows: runs can be viewed here, not made",
+                state="note",
+            )
         else:
-            yield Finding(group="installation", what=name, says="not installed", state="wrong", advice=f"pip install {name}")
+            yield Finding(
+                group="installation",
+                what=name,
+                says="not installed",
+                state="wrong",
+                advice=f"pip install {name}",
+            )
     yield Finding(group="installation", what="SQLite", says=sqlite3.sqlite_version)
 
 
@@ -50,18 +71,34 @@ def _version(name: str) -> str:
 
 def terminal() -> Iterator[Finding]:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        yield Finding(group="terminal", what="terminal", says="none: input or output is not a terminal; 'ddenv run' works without one")
+        yield Finding(
+            group="terminal",
+            what="terminal",
+            says="none: input or output is not a terminal; 'ddenv run' works without one",
+        )
     else:
         columns, lines = shutil.get_terminal_size()
         small = columns < SMALLEST[0] or lines < SMALLEST[1]
-        advice = f"the workbench is designed for {SMALLEST[0]} by {SMALLEST[1]} or more" if small else ""
-        yield Finding(group="terminal", what="size", says=f"{columns} columns, {lines} lines", state="note" if small else "ok", advice=advice)
+        advice = (
+            f"the workbench is designed for {SMALLEST[0]} by {SMALLEST[1]} or more" if small else ""
+        )
+        yield Finding(
+            group="terminal",
+            what="size",
+            says=f"{columns} columns, {lines} lines",
+            state="note" if small else "ok",
+            advice=advice,
+        )
 
 
 def machine() -> Iterator[Finding]:
     cores = processor.usable_cores()
     all_cores = os.cpu_count() or 1
-    yield Finding(group="machine", what="cores", says=f"{cores} of {all_cores} may be used; {processor.name()}")
+    yield Finding(
+        group="machine",
+        what="cores",
+        says=f"{cores} of {all_cores} may be used; {processor.name()}",
+    )
     yield _memory()
     yield _space("temporary files", Path(tempfile.gettempdir()), "machine")
 
@@ -74,12 +111,22 @@ def _memory() -> Finding:
     says = f"{usable / 1e9:.1f} GB may be used, {free / 1e9:.1f} GB are free"
     if free >= LITTLE_MEMORY:
         return Finding(group="machine", what="memory", says=says)
-    return Finding(group="machine", what="memory", says=says, state="note", advice="run fewer tests at the same time: --jobs 1")
+    return Finding(
+        group="machine",
+        what="memory",
+        says=says,
+        state="note",
+        advice="run fewer tests at the same time: --jobs 1",
+    )
 
 
 def runs() -> Iterator[Finding]:
     folder = runs_folder()
-    yield Finding(group="runs", what="folder", says=f"{folder}, {count(len(list(folder.glob(f'*{SUFFIX}'))), 'run')}")
+    yield Finding(
+        group="runs",
+        what="folder",
+        says=f"{folder}, {count(len(list(folder.glob(f'*{SUFFIX}'))), 'run')}",
+    )
     nearest = next(each for each in (folder, *folder.parents) if each.exists())
     yield _space("disk space", nearest, "runs")
 
@@ -96,5 +143,11 @@ def _space(what: str, folder: Path, group: str) -> Finding:
         advice = "set another one in DDENV_HOME or TMPDIR"
         return Finding(group=group, what=what, says=says, state="wrong", advice=advice)
     if free < LITTLE_SPACE:
-        return Finding(group=group, what=what, says=says, state="note", advice="a run needs up to a few hundred MB")
+        return Finding(
+            group=group,
+            what=what,
+            says=says,
+            state="note",
+            advice="a run needs up to a few hundred MB",
+        )
     return Finding(group=group, what=what, says=says)

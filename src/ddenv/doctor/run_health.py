@@ -46,7 +46,15 @@ def repair(path: Path, copy: Path) -> list[Finding]:
     if not found.trouble:
         return [Finding(group="copy", what="copy", says=f"{copy}: complete, {words}")]
     again = f"ddenv resume {copy} repeats the rest"
-    return [Finding(group="copy", what="copy", says=f"{copy}: {words}; everything after them is lost: {found.trouble}", state="note", advice=again)]
+    return [
+        Finding(
+            group="copy",
+            what="copy",
+            says=f"{copy}: {words}; everything after them is lost: {found.trouble}",
+            state="note",
+            advice=again,
+        )
+    ]
 
 
 @contextmanager
@@ -81,7 +89,9 @@ def _most(path: Path) -> Iterator[RunFile]:
             if not path.is_file():
                 raise
     if not any(counts.values()):
-        raise UserError(f"{path}: nothing can be repaired: no event can be read, with or without its log")
+        raise UserError(
+            f"{path}: nothing can be repaired: no event can be read, with or without its log"
+        )
     with _opened(path, max(counts, key=lambda each: counts[each])) as file:
         yield file
 
@@ -92,7 +102,9 @@ def _file(path: Path) -> Finding:
     says = f"{path}, {path.stat().st_size / 1e6:.1f} MB"
     if mode_beside(path) & 0o022:
         return _finding("file", f"{says}; others can write it", "note", f"chmod go-w {path}")
-    return _finding("file", f"{says}; {'others' if mode_beside(path) & 0o044 else 'only you'} can read it")
+    return _finding(
+        "file", f"{says}; {'others' if mode_beside(path) & 0o044 else 'only you'} can read it"
+    )
 
 
 def _log(path: Path, alive: bool) -> Finding:
@@ -114,11 +126,15 @@ def _log_of(path: Path) -> Path | None:
 
 def _content(file: RunFile, path: Path, alive: bool) -> Iterator[Finding]:
     found = faults(file)
-    yield _finding("SQLite", "; ".join(found) or "sound", *(("wrong", _repair(path)) if found else ()))
+    yield _finding(
+        "SQLite", "; ".join(found) or "sound", *(("wrong", _repair(path)) if found else ())
+    )
     read = whole(file)
     words = _how_much(read)
     if read.trouble:
-        yield _finding("events", f"{words} can be read; then: {read.trouble}", "wrong", _repair(path))
+        yield _finding(
+            "events", f"{words} can be read; then: {read.trouble}", "wrong", _repair(path)
+        )
     else:
         yield _finding("events", words)
     trouble = _parts(file)

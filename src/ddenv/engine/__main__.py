@@ -35,21 +35,45 @@ from ddenv.world.scenario import Scenario
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m ddenv.engine", description="Works on a run until it ends.")
+    parser = argparse.ArgumentParser(
+        prog="python -m ddenv.engine", description="Works on a run until it ends."
+    )
     parser.add_argument("run", type=Path)
     parser.add_argument("--jobs", type=int, default=processor.usable_cores())
-    parser.add_argument("--cluster", help="where the tests are made, in place of what the scenario says")
+    parser.add_argument(
+        "--cluster", help="where the tests are made, in place of what the scenario says"
+    )
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
-    parser.add_argument("--attended", choices=("yes", "no"), default="no", help="pause where there is an offer")
-    parser.add_argument("--bits", choices=("same", "mixed"), default="same", help="whether other bits may follow")
-    parser.add_argument("--anyway", choices=("yes", "no"), default="no", help="start after engines died at once")
+    parser.add_argument(
+        "--attended", choices=("yes", "no"), default="no", help="pause where there is an offer"
+    )
+    parser.add_argument(
+        "--bits", choices=("same", "mixed"), default="same", help="whether other bits may follow"
+    )
+    parser.add_argument(
+        "--anyway", choices=("yes", "no"), default="no", help="start after engines died at once"
+    )
     parser.add_argument("--share", type=Path, help="folder of other runs; their tests are reused")
-    parser.add_argument("--certify", type=int, help="one more certificate, with at least so many runs of what is left")
-    parser.add_argument("--certify-rate", type=float, help="the last one goes on until it shows this part of the rate")
-    parser.add_argument("--isolate", type=int, help="find the nearest world that passes; fresh runs, 0: as usual")
-    parser.add_argument("--margins", help="find margins of the numbers of these globs, a JSON list; []: of all")
+    parser.add_argument(
+        "--certify",
+        type=int,
+        help="one more certificate, with at least so many runs of what is left",
+    )
+    parser.add_argument(
+        "--certify-rate",
+        type=float,
+        help="the last one goes on until it shows this part of the rate",
+    )
+    parser.add_argument(
+        "--isolate", type=int, help="find the nearest world that passes; fresh runs, 0: as usual"
+    )
+    parser.add_argument(
+        "--margins", help="find margins of the numbers of these globs, a JSON list; []: of all"
+    )
     parser.add_argument("--most-runs", type=int, default=300, help="runs that margins may take")
-    parser.add_argument("--give-up", choices=("yes", "no"), default="no", help="end the isolation that is open")
+    parser.add_argument(
+        "--give-up", choices=("yes", "no"), default="no", help="end the isolation that is open"
+    )
     parser.add_argument("--after", type=int, help="the last command before it was asked to start")
     options = parser.parse_args()
     _say(ENGINE_STARTED)
@@ -102,12 +126,20 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
                 bench.check_repeats(options.bits == "mixed")
             note_start(scenario, world, robot, journal)
             if options.certify:
-                Driver(scenario, world, journal, bench, control).certify(options.certify, options.certify_rate)
+                Driver(scenario, world, journal, bench, control).certify(
+                    options.certify, options.certify_rate
+                )
             elif options.isolate is not None or journal.state.isolating is not None:
                 isolate(world, journal, bench, options.isolate or None, before)
             elif options.margins is not None or journal.state.margining is not None:
-                asked = None if options.margins is None else (json.loads(options.margins), options.most_runs)
-                find_margins((scenario, world, robot), journal, pool, control, asked, (stood, before))
+                asked = (
+                    None
+                    if options.margins is None
+                    else (json.loads(options.margins), options.most_runs)
+                )
+                find_margins(
+                    (scenario, world, robot), journal, pool, control, asked, (stood, before)
+                )
             else:
                 Driver(scenario, world, journal, bench, control).reduce()
     except Stopped as stop:
@@ -118,7 +150,9 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         journal.lose_running()
         # Of a bug in ddenv the traceback goes to the log, and views show the reason.
         bug = f"unexpected {type(error).__name__}: {error} (see the log beside the run)"
-        journal.record(events.EngineFailed(reason=str(error) if isinstance(error, UserError) else bug))
+        journal.record(
+            events.EngineFailed(reason=str(error) if isinstance(error, UserError) else bug)
+        )
         raise
     finally:
         file.set_live([])
@@ -128,7 +162,15 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
 
 def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:
     # This event comes first: all events before it are another engine's.
-    journal.record(events.EngineStarted(pid=os.getpid(), jobs=jobs, version=__version__, simulator=simulator(), machine=machine()))
+    journal.record(
+        events.EngineStarted(
+            pid=os.getpid(),
+            jobs=jobs,
+            version=__version__,
+            simulator=simulator(),
+            machine=machine(),
+        )
+    )
     journal.lose_running()
     if accept_mode not in (None, journal.state.accept_mode):
         journal.record(events.AcceptModeChanged(mode=accept_mode or ""))
@@ -142,14 +184,20 @@ def _give_up(file: RunFile) -> int:
     return 0
 
 
-def _workers(scenario: Scenario, world: World, robot: Model, jobs: int, cluster: str, journal: Journal) -> Workers:
+def _workers(
+    scenario: Scenario, world: World, robot: Model, jobs: int, cluster: str, journal: Journal
+) -> Workers:
     if cluster == HERE:
         return Pool(scenario, world, robot, jobs)
     # Only who asks for a cluster needs Dask.
     from ddenv.engine.cluster.cluster_pool import ClusterPool
 
     return ClusterPool(
-        scenario, world, robot, cluster, lambda tests, words: journal.record(events.Cluster(jobs=tests, words=words))
+        scenario,
+        world,
+        robot,
+        cluster,
+        lambda tests, words: journal.record(events.Cluster(jobs=tests, words=words)),
     )
 
 

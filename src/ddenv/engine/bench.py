@@ -59,7 +59,11 @@ class Bench:
     """
 
     def __init__(
-        self, journal: Journal, pool: Workers, control: Control, others: Mapping[Key, Place] | None = None
+        self,
+        journal: Journal,
+        pool: Workers,
+        control: Control,
+        others: Mapping[Key, Place] | None = None,
     ) -> None:
         self._failures: tuple[Failure, ...] = ()
         # What the failures were made of.
@@ -114,9 +118,15 @@ class Bench:
         journal = self._journal
         full = journal.is_full(wanted)
         source = journal.implying(wanted.environment, wanted.run, full)
-        implied = source is not None and wanted.why != "audit" and not audit_is_due(journal.state, wanted.why)
+        implied = (
+            source is not None
+            and wanted.why != "audit"
+            and not audit_is_due(journal.state, wanted.why)
+        )
         # The budget is that of the reduction, which is over.
-        if not implied and ((wanted.why != ISOLATE and self._is_spent()) or not self._control.has_disk_space()):
+        if not implied and (
+            (wanted.why != ISOLATE and self._is_spent()) or not self._control.has_disk_space()
+        ):
             return None
         environment = journal.number(wanted.environment)
         state = journal.state
@@ -176,7 +186,11 @@ class Bench:
             return
         result = self.made_again(test)
         if result is not None and not mixed:
-            how = f"broke ({result.failure})" if isinstance(result, Broken) else "gives a different trajectory"
+            how = (
+                f"broke ({result.failure})"
+                if isinstance(result, Broken)
+                else "gives a different trajectory"
+            )
             raise UserError(
                 f"{run}: repeated, the first run of the whole world {how}: the tests were made with {state.physics.proven}, and "
                 f"this is {state.physics.now}; 'ddenv resume {run} --mixed' continues anyway, 'ddenv resume {run} --again' "
@@ -204,7 +218,9 @@ class Bench:
         while not (ended := self._pool.finished(WAIT)):
             self._control.poll()
         result = ended[0][1]
-        same = isinstance(result, RunResult) and np.array_equal(result.trajectory, rows_of(journal.file, test.id))
+        same = isinstance(result, RunResult) and np.array_equal(
+            result.trajectory, rows_of(journal.file, test.id)
+        )
         return None if same else result
 
     def finish_trials(self) -> None:
@@ -265,7 +281,9 @@ class Bench:
         self._control.poll()
         taken = self._taken
         self._taken = []
-        finished = sorted([*taken, *self._pool.finished(0.0 if taken else wait)], key=lambda one: one[0])
+        finished = sorted(
+            [*taken, *self._pool.finished(0.0 if taken else wait)], key=lambda one: one[0]
+        )
         for test, result in finished:
             self._record(test, result)
             if result.outcome == "timeout":
@@ -318,5 +336,10 @@ class Bench:
             data["took_part"] = journal.models(data["took_part"])
         journal.record(TestFinished(test=test, **data), motions_of(result))
         compare(journal, [journal.state.test(test)])
-        if before is not None and before.cut and data["outcome"] not in (before.outcome, *BROKEN) and not data["cut"]:
+        if (
+            before is not None
+            and before.cut
+            and data["outcome"] not in (before.outcome, *BROKEN)
+            and not data["cut"]
+        ):
             journal.record(EarlyStopEnded(test=before.id, by=test))

@@ -93,7 +93,9 @@ class DiskSpace:
             files = (path, *(path.with_name(f"{path.name}{ending}") for ending in LOGS))
             below = limit - max(file.stat().st_size for file in files if file.exists())
             if below < NEEDED_IN_FILE:
-                return events.DiskSpace(enough=False, needed=NEEDED_IN_FILE, free=max(0, below), in_file=True)
+                return events.DiskSpace(
+                    enough=False, needed=NEEDED_IN_FILE, free=max(0, below), in_file=True
+                )
         free = shutil.disk_usage(path.parent).free
         return events.DiskSpace(enough=free >= NEEDED, needed=NEEDED, free=free)
 
@@ -290,13 +292,17 @@ def _changed(journal: Journal, asked: c.Change) -> events.Event:
 
 def _adopted(journal: Journal, asked: c.Adopt) -> events.Event:
     trial = journal.state.trials[asked.trial - 1]
-    return events.Adopted(trial=asked.trial, environment=trial.environment, evidence_test=trial.tests[-1])
+    return events.Adopted(
+        trial=asked.trial, environment=trial.environment, evidence_test=trial.tests[-1]
+    )
 
 
 def _left_out(journal: Journal, asked: c.LeaveOut) -> events.Event:
     test = asked.evidence(journal.state)
     assert test is not None
-    return events.LeftOut(without=asked.model, environment=test.environment, evidence_test=test.id, by_user=True)
+    return events.LeftOut(
+        without=asked.model, environment=test.environment, evidence_test=test.id, by_user=True
+    )
 
 
 def _accepted_other(journal: Journal, asked: c.AcceptOther) -> events.Event:
@@ -306,20 +312,36 @@ def _accepted_other(journal: Journal, asked: c.AcceptOther) -> events.Event:
     what = f"test {test.id}" if unnamed else c.label_of(state, test)
     judged = _judged(journal, (test.id,) if asked.instead else (*state.failures, test.id))
     trial = None if asked.instead else test.trial
-    return events.AcceptedOther(test=test.id, what=what, environment=test.environment, judged=judged, trial=trial, instead=asked.instead)
+    return events.AcceptedOther(
+        test=test.id,
+        what=what,
+        environment=test.environment,
+        judged=judged,
+        trial=trial,
+        instead=asked.instead,
+    )
 
 
 # What each decision of the user is in the run file.
 _EVENTS: dict[type[c.Command], Callable[[Journal, Any], events.Event]] = {
     c.AcceptMode: lambda journal, asked: events.AcceptModeChanged(mode=asked.mode),
-    c.Accept: lambda journal, asked: events.Decided(round=asked.round, candidate=asked.candidate, decision="accept"),
-    c.Reject: lambda journal, asked: events.Decided(round=asked.round, candidate=asked.candidate, decision="reject"),
+    c.Accept: lambda journal, asked: events.Decided(
+        round=asked.round, candidate=asked.candidate, decision="accept"
+    ),
+    c.Reject: lambda journal, asked: events.Decided(
+        round=asked.round, candidate=asked.candidate, decision="reject"
+    ),
     c.Veto: lambda journal, asked: events.Vetoed(round=asked.round, candidate=asked.candidate),
     c.Unveto: lambda journal, asked: events.Unvetoed(round=asked.round, candidate=asked.candidate),
-    c.Pin: lambda journal, asked: events.Pinned(models=c.numbers_of(journal.state, asked.new(journal.state))),
-    c.Unpin: lambda journal, asked: events.Unpinned(models=c.numbers_of(journal.state, asked.pinned(journal.state))),
+    c.Pin: lambda journal, asked: events.Pinned(
+        models=c.numbers_of(journal.state, asked.new(journal.state))
+    ),
+    c.Unpin: lambda journal, asked: events.Unpinned(
+        models=c.numbers_of(journal.state, asked.pinned(journal.state))
+    ),
     c.Try: lambda journal, asked: events.TrialStarted(
-        trial=len(journal.state.trials) + 1, environment=journal.number(Environment.of(asked.models))
+        trial=len(journal.state.trials) + 1,
+        environment=journal.number(Environment.of(asked.models)),
     ),
     c.Adopt: _adopted,
     c.LeaveOut: _left_out,

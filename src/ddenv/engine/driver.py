@@ -68,14 +68,18 @@ CHANGED = "a decision of the user ended the certificate; resume the run to conti
 class Driver:
     """One engine's work on one run. All decisions follow from the journal, so a resumed run continues in the same way."""
 
-    def __init__(self, scenario: Scenario, world: World, journal: Journal, bench: Bench, control: Control) -> None:
+    def __init__(
+        self, scenario: Scenario, world: World, journal: Journal, bench: Bench, control: Control
+    ) -> None:
         self._scenario = scenario
         self._world = world
         self._reduction = scenario.reduction
         self._journal = journal
         self._bench = bench
         self._control = control
-        self._sight = Sight(world, journal.state.elements, self._reduction.delta, self._reduction.seed)
+        self._sight = Sight(
+            world, journal.state.elements, self._reduction.delta, self._reduction.seed
+        )
         # What the schemas know: the tests behind the verdicts of rounds that are over, each once.
         self._trials: dict[int, Trial] = {}
         self._unknown: set[Environment] = set()
@@ -100,13 +104,24 @@ class Driver:
         journal = self._journal
         reduction = self._reduction
         # Unknown names are refused before a robot runs.
-        self.algorithm(steps.Leg(first_round=1, whole=NOTHING, chain=(NOTHING,), pinned=NOTHING, free={}, rule=Acceptance(most_misses=1)))
+        self.algorithm(
+            steps.Leg(
+                first_round=1,
+                whole=NOTHING,
+                chain=(NOTHING,),
+                pinned=NOTHING,
+                free={},
+                rule=Acceptance(most_misses=1),
+            )
+        )
         self._settle()
         leg = None if journal.state.baseline is None else self._first_leg()
         whole = journal.state.environments[0]
         keeps_rate = reduction.accept_rate == "kept"
         alike = ENOUGH_ALIKE if settings(journal.state).reduces_one_run else None
-        procedure = steps.procedure(self, whole, reduction.baseline_runs, keeps_rate, leg, enough_alike=alike)
+        procedure = steps.procedure(
+            self, whole, reduction.baseline_runs, keeps_rate, leg, enough_alike=alike
+        )
         if self._carry_out(procedure) is None:
             self._end(False, str(self._baseline))
         else:
@@ -120,11 +135,22 @@ class Driver:
         moves = any(model.links and not model.static for model in self._world.models)
         # A simulator in Python names the models that affected a run, and those that they rest on.
         in_python = scenario.oracle is not None and scenario.oracle.use is not None
-        if (not moves or (in_python and not needed)) and self._reduction.slice and journal.state.ties is None:
+        if (
+            (not moves or (in_python and not needed))
+            and self._reduction.slice
+            and journal.state.ties is None
+        ):
             journal.record(events.Still())
-        if journal.state.ties is not None or journal.state.unsettled or journal.state.supports or not moves:
+        if (
+            journal.state.ties is not None
+            or journal.state.unsettled
+            or journal.state.supports
+            or not moves
+        ):
             return
-        why = "only ddenv's own simulator finds which models rest on which; leave it out, or 'oracle'"
+        why = (
+            "only ddenv's own simulator finds which models rest on which; leave it out, or 'oracle'"
+        )
         if scenario.oracle is None:
             found = self._bench.settle()
             if not isinstance(found, Broken):
@@ -148,7 +174,9 @@ class Driver:
         # A search that is due would begin at the end.
         leg = self._next_leg()
         self._only_certify = at_least
-        chain = tuple(self._journal.state.environments[node.id] for node in self._journal.state.path)
+        chain = tuple(
+            self._journal.state.environments[node.id] for node in self._journal.state.path
+        )
         try:
             self._carry_out(steps.certify(self, leg, chain))
         except steps.Changed:
@@ -191,8 +219,16 @@ class Driver:
             self._check_repeats()
             before = journal.state
             first = 1 if before.round is None else before.round.number + 1
-            rate = journal.rate_of_whole() if before.scenario["reduction"]["accept_rate"] == "kept" else 0.0
-            journal.record(events.LegStarted(round=first, n_partitions=before.nodes[before.node].n_partitions, rate=rate))
+            rate = (
+                journal.rate_of_whole()
+                if before.scenario["reduction"]["accept_rate"] == "kept"
+                else 0.0
+            )
+            journal.record(
+                events.LegStarted(
+                    round=first, n_partitions=before.nodes[before.node].n_partitions, rate=rate
+                )
+            )
         leg = journal.state.leg
         assert leg is not None
         self._reduction = Reduction.model_validate(leg.settings)
@@ -200,11 +236,21 @@ class Driver:
         state = journal.state
         asked = self._reduction
         exact = exact_runs(journal.state)
-        together = Stacks.of(map(journal.models, stacks_of(state, state.nodes[leg.node].environment)))
+        together = Stacks.of(
+            map(journal.models, stacks_of(state, state.nodes[leg.node].environment))
+        )
         stays = journal.models(leg.pinned)
         stays |= together.of_any(stays)
-        free = {model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)}
-        rule = Acceptance(most_misses=1 + asked.iterations, rate=leg.rate, keep_rate=asked.keep_rate, steps_back=leg.steps_back, broke=broken_runs(state))
+        free = {
+            model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)
+        }
+        rule = Acceptance(
+            most_misses=1 + asked.iterations,
+            rate=leg.rate,
+            keep_rate=asked.keep_rate,
+            steps_back=leg.steps_back,
+            broke=broken_runs(state),
+        )
         rule = self._bench.rule = Acceptance(most_misses=len(exact), exact=exact) if exact else rule
         chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
         self._leg = steps.Leg(
@@ -233,7 +279,11 @@ class Driver:
             # Other seeds have repeated it. The runs behind the result are replayed at the end.
             return
         test = journal.test(journal.whole, exact[0])
-        if test is not None and test.phase == "baseline" and self._bench.made_again(test) is not None:
+        if (
+            test is not None
+            and test.phase == "baseline"
+            and self._bench.made_again(test) is not None
+        ):
             raise UserError(
                 f"reduction.accept_rate: exact needs runs that repeat, but run {test.run + 1} of the whole world, replayed "
                 f"with seed {test.seed}, differs; keep its rate: --accept-rate kept"
@@ -242,7 +292,11 @@ class Driver:
     def _nodes(self, node: int) -> tuple[Node, ...]:
         """The way to a node, from where the same failures counted as f as now."""
         path = self._journal.state.changed(node=node).path
-        begin = max(place for place, one in enumerate(path) if place == 0 or one.how in ("accepted", "instead"))
+        begin = max(
+            place
+            for place, one in enumerate(path)
+            if place == 0 or one.how in ("accepted", "instead")
+        )
         return path[begin:]
 
     # What the procedure asks.
@@ -273,10 +327,14 @@ class Driver:
             runs=lambda: leg.rule.misses,
             # The algorithm knows one model of each stack.
             broke=lambda candidate: (
-                leg.pinned | Environment.of(self._stacks.expanded(candidate.models)) in self._unknown
+                leg.pinned | Environment.of(self._stacks.expanded(candidate.models))
+                in self._unknown
             ),
             proves=leg.rule.proves,
-            **{name: getattr(asked, name) for name in ("prior", "candidates", "complement_order", "growth", "skip")},
+            **{
+                name: getattr(asked, name)
+                for name in ("prior", "candidates", "complement_order", "growth", "skip")
+            },
         )
         searched = partial(search, asked.algorithm, guide=guide)
         return self._stacks.expand(tried_again(self._stacks.representatives, leg.again, searched))
@@ -297,7 +355,9 @@ class Driver:
         journal = self._journal
         whole = self._journal.state.environments[0]
         tests = [journal.state.test(test) for test in journal.tests(whole, range(runs))]
-        trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
+        trajectories = {
+            test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"
+        }
         asked = self._reduction
         found = self._baseline = fix_failure(
             tests,
@@ -310,7 +370,9 @@ class Driver:
         )
         if isinstance(found, str):
             return None
-        found = self._baseline = replace(found, alike=found.failures == runs > 1 and self._alike(tests))
+        found = self._baseline = replace(
+            found, alike=found.failures == runs > 1 and self._alike(tests)
+        )
         f, *others = sorted(found.seen, key=lambda one: one.test != found.failure_test)
         competed = any(COMPETES * one.runs >= f.runs for one in others)
         return steps.Baseline(found.failures, competed, found.alike)
@@ -341,7 +403,9 @@ class Driver:
             if past.digest != digest(parts):
                 raise UserError(OTHER_WAY.format(number))
             self._learn(past.tests, past.evidence_test)
-            self._unknown.update(round.candidates[index].models | self._leg.pinned for index in past.unknown)
+            self._unknown.update(
+                round.candidates[index].models | self._leg.pinned for index in past.unknown
+            )
             return steps.Past(past.winner)
         if state.round is None or state.round.number < number:
             self._announce(number, round)
@@ -364,17 +428,23 @@ class Driver:
                 n_partitions=round.n_partitions,
                 environment=journal.number(environment),
                 partitions=tuple(tuple(sorted(part)) for part in round.partitions),
-                candidates=tuple((one.kind, one.partition, scores[one.partition]) for one in round.candidates),
+                candidates=tuple(
+                    (one.kind, one.partition, scores[one.partition]) for one in round.candidates
+                ),
                 pinned=leg.pinned & environment,
             )
         )
         models = sum(stack <= environment for stack in leg.free.values())
         expected = search_tests(models, self._reduction, known_failure(journal.state).rate)
-        journal.record(events.Forecast(round=number, tests=expected, tests_done=journal.state.tests_done))
+        journal.record(
+            events.Forecast(round=number, tests=expected, tests_done=journal.state.tests_done)
+        )
         refused = {refusal.environment: refusal.verdict for refusal in journal.state.refused}
         for index, one in enumerate(round.candidates) if refused else ():
             if verdict := refused.get(one.models | leg.pinned):
-                journal.record(events.Vetoed(round=number, candidate=index, verdict=verdict, again=True))
+                journal.record(
+                    events.Vetoed(round=number, candidate=index, verdict=verdict, again=True)
+                )
 
     def judged(self, index: int, environment: Environment, verdict: str, runs: int) -> None:
         """Records a verdict, unless an earlier engine has."""
@@ -385,7 +455,11 @@ class Driver:
         if round.candidates[index].verdict:
             return
         tests = journal.tests(environment, map(self._leg.rule.run, range(runs)))
-        journal.record(events.CandidateJudged(round=round.number, candidate=index, verdict=verdict, tests=tests))
+        journal.record(
+            events.CandidateJudged(
+                round=round.number, candidate=index, verdict=verdict, tests=tests
+            )
+        )
 
     def similar(self, number: int, index: int, environment: Environment) -> bool:
         """In accept mode `ask`, waits for the user, who may also choose an earlier candidate."""
@@ -401,7 +475,14 @@ class Driver:
             if journal.current.accepted != index:
                 return False
         test = journal.evidence_of(journal.current.candidates[index].tests)
-        journal.record(events.Reduced(round=number, candidate=index, environment=journal.number(environment), evidence_test=test))
+        journal.record(
+            events.Reduced(
+                round=number,
+                candidate=index,
+                environment=journal.number(environment),
+                evidence_test=test,
+            )
+        )
         return True
 
     def round_ended(self, number: int, winner: int | None) -> None:
@@ -427,7 +508,9 @@ class Driver:
         shown = [test for test in state.tests if test.shows_f]
         failing = [test for test in shown if test.phase == "baseline"]
         base = known_failure(state)
-        replays = max(FEWEST_REPLAYS, 1 + iterations_needed(estimated_rate(base.failures, base.runs), SURELY))
+        replays = max(
+            FEWEST_REPLAYS, 1 + iterations_needed(estimated_rate(base.failures, base.runs), SURELY)
+        )
         if not failing or replays > MOST_REPLAYS or any(test.round == round for test in shown):
             return
         for replay, test in enumerate(islice(cycle(failing), replays)):
@@ -458,18 +541,41 @@ class Driver:
             asked = self._reduction
             number = len(journal.state.certificates) + 1
             # What the bets have won so far holds for any share, so that the same ones can go on.
-            before = last if last is not None and self._certify_rate is not None and not last.seeds else None
+            before = (
+                last
+                if last is not None and self._certify_rate is not None and not last.seeds
+                else None
+            )
             # Where chosen runs were reduced, a rate is shown if the user asks for one.
             exact = () if self._certify_rate else self._leg.rule.exact
             shown = [run for run in exact if journal.shown(journal.environment, run)]
-            seeds = tuple(journal.state.test(test).seed for test in journal.tests(journal.environment, shown))
+            seeds = tuple(
+                journal.state.test(test).seed for test in journal.tests(journal.environment, shown)
+            )
             beside = RUNS_BESIDE_ALIKE if stands_for_all(journal.state) else RUNS_BESIDE
-            at_least = max(self._only_certify or 0, beside) if seeds else self._only_certify or asked.baseline_runs
-            first, error = (before.first_run, before.error) if before else (journal.fresh_run, error_of(number))
+            at_least = (
+                max(self._only_certify or 0, beside)
+                if seeds
+                else self._only_certify or asked.baseline_runs
+            )
+            first, error = (
+                (before.first_run, before.error)
+                if before
+                else (journal.fresh_run, error_of(number))
+            )
             rate = journal.rate_of_whole()
             share = self._certify_rate or asked.certify_rate
             note_price(journal, share, at_least)
-            started = events.CertificateStarted(certificate=number, run=first, rate=rate, keep_rate=asked.keep_rate, error=error, at_least=at_least, certify_rate=share, seeds=seeds)
+            started = events.CertificateStarted(
+                certificate=number,
+                run=first,
+                rate=rate,
+                keep_rate=asked.keep_rate,
+                error=error,
+                at_least=at_least,
+                certify_rate=share,
+                seeds=seeds,
+            )
             journal.record(started)
             last = journal.state.certificates[-1]
         terms = terms_of(journal.state, last)
@@ -479,12 +585,22 @@ class Driver:
         if not self._certificate.claims:
             first = made.certificate.first_run
             journal = self._journal
-            chosen = [test for one in made.claims for test in journal.tests(one.environment, made.certificate.exact)]
+            chosen = [
+                test
+                for one in made.claims
+                for test in journal.tests(one.environment, made.certificate.exact)
+            ]
             exactly = not chosen or self._all_repeat(chosen)
             claims = tuple(self._claim_made(claim, first, exactly) for claim in made.claims)
-            rested_on = journal.full_tests((test for one in made.claims for test in one.claim.rests_on), first)
+            rested_on = journal.full_tests(
+                (test for one in made.claims for test in one.claim.rests_on), first
+            )
             tests = tuple(sorted({*rested_on, *chosen}))
-            journal.record(events.CertificateFinished(claims=claims, tests=tests, elsewhere=self._elsewhere(tests)))
+            journal.record(
+                events.CertificateFinished(
+                    claims=claims, tests=tests, elsewhere=self._elsewhere(tests)
+                )
+            )
         self._end_early_stop_if_refuted()
 
     def _end_early_stop_if_refuted(self) -> None:
@@ -506,7 +622,11 @@ class Driver:
         if self._certificate.branch or len(state.failures) > 1:
             return None
         left = state.nodes[state.node].id
-        fresh = [test for test in state.tests_of(tests) if test.phase == CERTIFY and test.environment == left]
+        fresh = [
+            test
+            for test in state.tests_of(tests)
+            if test.phase == CERTIFY and test.environment == left
+        ]
         return elsewhere(ends_of(of_baseline(state), "similar"), ends_of(fresh, "similar"), epsilon)
 
     def _all_repeat(self, tests: Iterable[int]) -> bool:
@@ -557,12 +677,16 @@ class Driver:
             bound=claim.bound,
         )
 
-    def stepped_back(self, place: int, again: tuple[Partition, ...], tests: tuple[NumberedRun, ...]) -> NoReturn:
+    def stepped_back(
+        self, place: int, again: tuple[Partition, ...], tests: tuple[NumberedRun, ...]
+    ) -> NoReturn:
         journal = self._journal
         nodes = self._nodes(journal.state.node)
         node = nodes[place].number
         lost = nodes[place + 1].number
-        journal.record(events.RateLost(node=node, lost=lost, again=again, tests=journal.full_tests(tests)))
+        journal.record(
+            events.RateLost(node=node, lost=lost, again=again, tests=journal.full_tests(tests))
+        )
         self._bench.wait_for_search()
 
     def left_out(self, model: int, environment: Environment) -> NoReturn:
@@ -570,7 +694,11 @@ class Driver:
         first = self._certificate.first_run
         runs = range(first, journal.fresh_run)
         evidence = journal.evidence_of(journal.tests(environment, runs, full=True))
-        journal.record(events.LeftOut(without=model, environment=journal.number(environment), evidence_test=evidence))
+        journal.record(
+            events.LeftOut(
+                without=model, environment=journal.number(environment), evidence_test=evidence
+            )
+        )
         self._bench.wait_for_search()
 
     # The end.
@@ -588,9 +716,15 @@ class Driver:
         is_gone = left.verdict == "not shown" and not left.shown
         vanished = "f does not repeat; " if is_gone else ""
         bare = "" if journal.environment else f"{NO_MODEL}; "
-        reason = bare + vanished + verdict_on(certificate, len(pinned), "stack" if together else "single model")
+        reason = (
+            bare
+            + vanished
+            + verdict_on(certificate, len(pinned), "stack" if together else "single model")
+        )
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]
-        if any(journal.is_refused_by_user(journal.without(name)) for name in spare if name is not None):
+        if any(
+            journal.is_refused_by_user(journal.without(name)) for name in spare if name is not None
+        ):
             reason += "; leaving it out was vetoed or rejected"
         if together:
             reason += f"; stacks were kept together ({count(len(stacks), 'stack')})"

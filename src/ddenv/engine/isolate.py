@@ -31,7 +31,9 @@ VERDICTS = {"similar": "passes", "dissimilar": "fails", "unknown": "unknown"}
 CHANGED = "a decision of the user or a wrong slice ended the isolation; resume the run to continue from there"
 
 
-def isolate(world: World, journal: Journal, bench: Bench, at_least: int | None, before: str) -> None:
+def isolate(
+    world: World, journal: Journal, bench: Bench, at_least: int | None, before: str
+) -> None:
     """Finds the nearest world that passes, or goes on with that; the run is finished then as it was, because of `before`.
 
     The end has `at_least` fresh runs; another number than the open search has begins a new one. Raises as `Bench.work`.
@@ -45,7 +47,11 @@ def isolate(world: World, journal: Journal, bench: Bench, at_least: int | None, 
     journal.lose_running()
     _open(journal)
     whole = journal.state.environments[0]
-    journal.record(events.IsolationFinished(environment=None if removed is None else journal.number(whole - removed)))
+    journal.record(
+        events.IsolationFinished(
+            environment=None if removed is None else journal.number(whole - removed)
+        )
+    )
 
 
 def _open(journal: Journal) -> Isolation:
@@ -71,7 +77,9 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
     stacks = _free(journal).by_first
     left = journal.environment
     gone = {first: left.isdisjoint(stack) for first, stack in stacks.items()}
-    suspects = sorted(stacks, key=lambda first: (gone[first], min(distance[model] for model in stacks[first])))
+    suspects = sorted(
+        stacks, key=lambda first: (gone[first], min(distance[model] for model in stacks[first]))
+    )
     chosen = exact_runs(state) if journal.whole == state.environments[0] else ()
     number = len(state.isolations) + 1
     first = FIRST_RUN if last is None else last.asked.run + MOST_CHECKS * last.asked.block
@@ -152,7 +160,9 @@ class _Isolator:
         journal = self._journal
         number = self._journal.number(environment)
         verdict = VERDICTS[verdict]
-        known = (removal.verdict for removal in journal.state.removals if removal.environment == number)
+        known = (
+            removal.verdict for removal in journal.state.removals if removal.environment == number
+        )
         if next(known, "") != verdict:
             tests = journal.tests(environment, map(self._asked.rule.run, range(runs)), full=True)
             journal.record(events.RemovalJudged(environment=number, verdict=verdict, tests=tests))
@@ -161,10 +171,15 @@ class _Isolator:
         journal = self._journal
         now = _open(self._journal)
         first = now.asked.run + len(now.checks) * now.asked.block
-        rests_on = journal.full_tests((test for one in check.claims for test in one.claim.rests_on), first)
+        rests_on = journal.full_tests(
+            (test for one in check.claims for test in one.claim.rests_on), first
+        )
         claims = []
         for one in check.claims:
-            shown = [self.shown(one.environment, run) for run in one.exact or [first + run for run in one.runs]]
+            shown = [
+                self.shown(one.environment, run)
+                for run in one.exact or [first + run for run in one.runs]
+            ]
             runs = sum(type(each) is bool for each in shown)
             reached = shown.count(True)
             share = reached / max(1, runs)
@@ -181,14 +196,18 @@ class _Isolator:
             )
             claims.append(claim)
         environment = journal.number(self._whole - check.removed)
-        journal.record(events.IsolationChecked(environment=environment, claims=tuple(claims), tests=rests_on))
+        journal.record(
+            events.IsolationChecked(environment=environment, claims=tuple(claims), tests=rests_on)
+        )
 
     def _known_checks(self) -> list[Checked]:
         """What fresh runs have shown before this engine."""
         journal = self._journal
         checks = list[Checked]()
         for check in _open(journal).checks:
-            passing = journal.state.environments[journal.state.removals[check.removal - 1].environment]
+            passing = journal.state.environments[
+                journal.state.removals[check.removal - 1].environment
+            ]
             claims = []
             for one in check.claims:
                 model = None if one.back is None else next(iter(journal.models([one.back])))

@@ -15,7 +15,16 @@ from ddenv.reduction.procedure import Test as Wanted
 from ddenv.runfile.events import EnvironmentNamed, Event, TestLost
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
-from ddenv.runfile.state import BROKEN, CERTIFY, FIRST_FRESH_RUN, FRESH_RUNS, ISOLATE, Round, RunState, Test
+from ddenv.runfile.state import (
+    BROKEN,
+    CERTIFY,
+    FIRST_FRESH_RUN,
+    FRESH_RUNS,
+    ISOLATE,
+    Round,
+    RunState,
+    Test,
+)
 from ddenv.runfile.store import Motions, RunFile
 from ddenv.runfile.supports import stack_with
 from ddenv.settings import SETTINGS, read
@@ -39,12 +48,16 @@ class Journal:
         self._numbers: dict[Environment, int] = {}
         self._tests: dict[tuple[int, int, bool], int] = {}
         # By run: what took part in a simulated test, its models, its number.
-        self._implying: dict[tuple[int, bool], list[tuple[Environment, Environment, int]]] = defaultdict(list)
+        self._implying: dict[tuple[int, bool], list[tuple[Environment, Environment, int]]] = (
+            defaultdict(list)
+        )
         self._broke: Counter[tuple[int, int, bool, int]] = Counter()
         self._ties: tuple[object, Ties] = None, Ties.among(())
         self._remember(RunState(), self.state)
 
-    def record(self, event: Event, motions: Motions | None = None, number: int | None = None) -> None:
+    def record(
+        self, event: Event, motions: Motions | None = None, number: int | None = None
+    ) -> None:
         """Writes an event."""
         before = self.state
         self.state = apply(before, self.file.append(event, motions, self.command, number))
@@ -86,14 +99,18 @@ class Journal:
                 self._implying[test.run, full].append((test.took_part, there, test.id))
 
     def _forget(self, which: Callable[[Test], bool]) -> None:
-        self._tests = {key: test for key, test in self._tests.items() if not which(self.state.test(test))}
+        self._tests = {
+            key: test for key, test in self._tests.items() if not which(self.state.test(test))
+        }
 
     def _is_made_again(self, broken: Test) -> bool:
         """A baseline that is done, and a certificate, may do without a few runs that broke."""
         if broken.phase == "baseline":
             return self.state.baseline is None
         last = self.state.certificates[-1:]
-        return broken.phase != CERTIFY or any(claim.verdict == "unknown" for one in last for claim in one.claims)
+        return broken.phase != CERTIFY or any(
+            claim.verdict == "unknown" for one in last for claim in one.claims
+        )
 
     def models(self, names: Iterable[str]) -> Environment:
         """The environment of those of these models that are elements."""
@@ -106,7 +123,9 @@ class Journal:
     def in_order(self, times: Mapping[str, float]) -> tuple[tuple[int, float], ...]:
         """`times` by name, s, as (model, s) in order of time; only for elements."""
         numbers = self._number_of
-        pairs = sorted((seconds, numbers[name]) for name, seconds in times.items() if name in numbers)
+        pairs = sorted(
+            (seconds, numbers[name]) for name, seconds in times.items() if name in numbers
+        )
         return tuple((number, seconds) for seconds, number in pairs)
 
     def number(self, environment: Environment) -> int:
@@ -160,7 +179,15 @@ class Journal:
 
     def full_tests(self, tests: Iterable[NumberedRun], first: int = 0) -> Numbers:
         """The numbers of the finished full tests among these, sorted; their runs are counted from `first`."""
-        return tuple(sorted({one for models, run in tests for one in self.tests(models, (first + run,), full=True)}))
+        return tuple(
+            sorted(
+                {
+                    one
+                    for models, run in tests
+                    for one in self.tests(models, (first + run,), full=True)
+                }
+            )
+        )
 
     def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
         """Whether a run showed f; None if it is not made yet."""
@@ -174,7 +201,10 @@ class Journal:
     @property
     def stops_early(self) -> bool:
         """Whether tests may end early."""
-        return bool(read(self.state.scenario, SETTINGS["early_stop"])) and self.state.early_stop_ended is None
+        return (
+            bool(read(self.state.scenario, SETTINGS["early_stop"]))
+            and self.state.early_stop_ended is None
+        )
 
     def is_full(self, wanted: Wanted) -> bool:
         """Whether a test runs to its end although its verdict is clear before."""
@@ -186,13 +216,24 @@ class Journal:
         if ties is None:
             return None
         made = self._implying[run, full]
-        return next((test for took_part, there, test in made if implies(took_part, there, environment, ties)), None)
+        return next(
+            (
+                test
+                for took_part, there, test in made
+                if implies(took_part, there, environment, ties)
+            ),
+            None,
+        )
 
     @property
     def ties(self) -> Ties | None:
         """The ties of the run; None where no slices may be used: unwanted, unknown ties, or an audit that found a difference."""
         state = self.state
-        if state.ties is None or state.refuted is not None or not read(state.scenario, SETTINGS["slice"]):
+        if (
+            state.ties is None
+            or state.refuted is not None
+            or not read(state.scenario, SETTINGS["slice"])
+        ):
             return None
         if self._ties[0] is not state.ties:
             self._ties = state.ties, Ties.among(self.pairs((*state.ties, *state.welds)))
@@ -203,7 +244,10 @@ class Journal:
         whole = self._numbers[self.whole]
         state = self.state
         # In the runs that chose f it was lucky.
-        lucky = {("baseline", run) for run in range(0 if state.baseline is None else state.baseline.chose)}
+        lucky = {
+            ("baseline", run)
+            for run in range(0 if state.baseline is None else state.baseline.chose)
+        }
         tests = [
             test
             for test in state.tests

@@ -68,7 +68,9 @@ def result_data(result: Result, failures: Sequence[Failure] = ()) -> Data:
         "simulated_seconds": result.simulated_seconds,
         "wall_seconds": result.wall_seconds,
         "first_sensed": {name: round(seconds, 3) for name, seconds in result.first_sensed.items()},
-        "first_touched": {name: round(seconds, 3) for name, seconds in result.first_touched.items()},
+        "first_touched": {
+            name: round(seconds, 3) for name, seconds in result.first_touched.items()
+        },
         "cut": result.cut,
         **more,
     }
@@ -129,7 +131,9 @@ def rejudged(file: RunFile, state: RunState, failures: tuple[Failure, ...]) -> O
     """The outcomes of all failed tests so far, judged by `failures`."""
     judged = {}
     for test in (test.id for test in state.tests if test.outcome in ("similar", "other")):
-        judged[test] = nearest([judge_trajectory(rows_of(file, test), failure) for failure in failures])
+        judged[test] = nearest(
+            [judge_trajectory(rows_of(file, test), failure) for failure in failures]
+        )
     return _outcomes(judged)
 
 
@@ -142,10 +146,17 @@ def fixed_again(file: RunFile, state: RunState) -> BaselineFinished:
     """The baseline by what counts as the same failure now, which judges all tests. Raises UserError if it shows none."""
     before = known_failure(state)
     reduction = asked_of(state)
-    tests = {test.run: test for test in state.tests if test.phase == "baseline" and test.is_finished}
+    tests = {
+        test.run: test for test in state.tests if test.phase == "baseline" and test.is_finished
+    }
     failed = ("failed", "similar", "other")
-    unjudged = [replace(one, outcome="failed") if one.outcome in failed else one for _, one in sorted(tests.items())]
-    trajectories = {test.id: rows_of(file, test.id) for test in unjudged if test.outcome == "failed"}
+    unjudged = [
+        replace(one, outcome="failed") if one.outcome in failed else one
+        for _, one in sorted(tests.items())
+    ]
+    trajectories = {
+        test.id: rows_of(file, test.id) for test in unjudged if test.outcome == "failed"
+    }
     spec = spec_of(state)
     found = fix_failure(
         unjudged,
@@ -160,7 +171,9 @@ def fixed_again(file: RunFile, state: RunState) -> BaselineFinished:
         raise UserError(found)
     f = Failure(found.position, trajectories[found.failure_test], spec.epsilon, spec.similarity)
     alike = before.alike and found.failures == found.runs
-    return replace(found, judged=rejudged(file, state, (f,)), wall_limit=before.wall_limit, alike=alike)
+    return replace(
+        found, judged=rejudged(file, state, (f,)), wall_limit=before.wall_limit, alike=alike
+    )
 
 
 def fix_failure(
@@ -184,12 +197,17 @@ def fix_failure(
     failing = [test for test in failed if not chose or test.run < chose]
     if not failing:
         return _no_failure(tests)
-    failures = [Failure(end_of(test), trajectories[test.id], spec.epsilon, spec.similarity) for test in failing]
+    failures = [
+        Failure(end_of(test), trajectories[test.id], spec.epsilon, spec.similarity)
+        for test in failing
+    ]
 
     def apart(first: int, second: int) -> float | None:
         if judge_trajectory(failures[second].trajectory, failures[first]).outcome != "similar":
             return None
-        return float(np.linalg.norm(np.subtract(failures[first].position, failures[second].position)))
+        return float(
+            np.linalg.norm(np.subtract(failures[first].position, failures[second].position))
+        )
 
     # By the oracle alone, not by kind: what it judges as one failure cannot be reduced as two.
     groups = grouped(len(failing), apart)
@@ -200,7 +218,10 @@ def fix_failure(
         # The first one is in their middle.
         seen.append(SeenFailure(group[0].id, len(group), names, end_of(group[0])))
     if wanted > len(seen):
-        listed = "; ".join(f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in enumerate(seen, 1))
+        listed = "; ".join(
+            f"{number}. {one.name} in {count(one.runs, 'run')}"
+            for number, one in enumerate(seen, 1)
+        )
         runs = sum(not test.broke for test in tests)
         return f"there is no failure number {wanted}; {runs} runs of the whole world showed these: {listed}"
     f = groups[wanted - 1][0]
@@ -270,7 +291,9 @@ class Sight:
         models = {model.name: model for model in world.models}
         positions = {name: center(models[name]) for name in elements}
         traits = {name: traits_of(models[name]) for name in elements}
-        self._known = Evidence(elements=tuple(elements), positions=positions, traits=traits, delta=delta, seed=seed)
+        self._known = Evidence(
+            elements=tuple(elements), positions=positions, traits=traits, delta=delta, seed=seed
+        )
 
     def evidence(self, journal: Journal, test: int) -> Evidence:
         """The evidence if `test` was the last similar run."""
@@ -278,9 +301,17 @@ class Sight:
         run = state.test(test)
         # If several failures count as f, the one that the run showed.
         ends = [end_of(state.test(test)) for test in state.failures]
-        end = ends[0] if run.end_pose is None else min(ends, key=lambda end: math.dist(end, end_of(run)))
+        end = (
+            ends[0]
+            if run.end_pose is None
+            else min(ends, key=lambda end: math.dist(end, end_of(run)))
+        )
         # Whether a model that affected no run was sensed depends on which of two equal runs was simulated.
-        seen = set(state.elements) if run.took_part is None else set(run.took_part.names(state.elements))
+        seen = (
+            set(state.elements)
+            if run.took_part is None
+            else set(run.took_part.names(state.elements))
+        )
         return replace(
             self._known,
             trajectory=trajectory_of(rows_of(journal.file, test)),

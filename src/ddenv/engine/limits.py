@@ -32,7 +32,13 @@ MOST_LATE = 3
 # So many engines may die in a row, each before it has got anywhere: before it wrote anything but these, among the last events.
 MOST_DEATHS = 3
 LAST = 3000
-NOWHERE = {"accept_mode_changed", "comparing", "supports_started", "leg_started", "environment_named"}
+NOWHERE = {
+    "accept_mode_changed",
+    "comparing",
+    "supports_started",
+    "leg_started",
+    "environment_named",
+}
 NOWHERE |= {"test_started", "test_lost"}
 HELPS = "try fewer models that can move, a shorter --timeout, another simulation.time_step in the scenario"
 
@@ -49,7 +55,10 @@ def wall_limit(state: RunState) -> float:
 def limit_after(state: RunState, timeout: float) -> float:
     """What a test of `timeout` simulated s may take after the baseline, s."""
     sound = (test for test in state.tests if test.phase == "baseline" and not test.broke)
-    slowest = max((test.wall_seconds / test.simulated_seconds for test in sound if test.simulated_seconds), default=0.0)
+    slowest = max(
+        (test.wall_seconds / test.simulated_seconds for test in sound if test.simulated_seconds),
+        default=0.0,
+    )
     return max(LEAST, math.ceil(FACTOR * slowest * timeout))
 
 

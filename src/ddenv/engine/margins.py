@@ -49,7 +49,9 @@ def refusal(state: RunState, where: object) -> str:
     certificate = current(state)
     if state.baseline is None:
         return f"f is not known yet, so there are no margins; run it first: ddenv resume {where}"
-    if state.margining is None and (state.status not in ("finished", "stopped") or state.isolating is not None):
+    if state.margining is None and (
+        state.status not in ("finished", "stopped") or state.isolating is not None
+    ):
         return f"its search has not finished; finish it first: ddenv resume {where}"
     left = None if certificate is None else certificate.claims[0]
     if (state.baseline.rate if left is None else left.shown / left.runs) < known.RAREST:
@@ -73,11 +75,23 @@ def find_margins(
     if asked is not None:
         numbers = numbers_left(parts, journal.state, asked[0])
         budget = asked[1]
-        if now is None or (now.wanted, now.asked.budget) != (tuple(one.name for one in numbers), budget):
-            _begin(journal, numbers, budget, stood if now is None else (now.asked.status, now.asked.before))
+        if now is None or (now.wanted, now.asked.budget) != (
+            tuple(one.name for one in numbers),
+            budget,
+        ):
+            _begin(
+                journal,
+                numbers,
+                budget,
+                stood if now is None else (now.asked.status, now.asked.before),
+            )
     _Search(parts, journal, pool, control).carry_out()
     margins = journal.state.margins
-    if margins is not None and (pairs := known.pairs_of(margins)) and not margins.asked.numbers[0].together:
+    if (
+        margins is not None
+        and (pairs := known.pairs_of(margins))
+        and not margins.asked.numbers[0].together
+    ):
         left = margins.asked.budget - len(margins.runs) + margins.before_call
         if left >= known.FIRST_LOOK:
             journal.record(replace(margins.asked, numbers=pairs, budget=left))
@@ -85,18 +99,33 @@ def find_margins(
     journal.record(events.MarginsFinished())
 
 
-def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: tuple[str, str]) -> None:
+def _begin(
+    journal: Journal, numbers: Sequence[Number], budget: int, stood: tuple[str, str]
+) -> None:
     certificate = current(journal.state)
     rate = journal.rate_of_whole()
     if certificate is not None:
         rate = estimated_rate(certificate.claims[0].shown, certificate.claims[0].runs)
     asked = tuple(events.NumberAsked(**asdict(one)) for one in numbers)
     # Two numbers may be changed together at the end.
-    error = known.error_each(rate, min(budget, known.MOST_OF_NUMBER * (len(numbers) + (len(numbers) > 1))))
+    error = known.error_each(
+        rate, min(budget, known.MOST_OF_NUMBER * (len(numbers) + (len(numbers) > 1)))
+    )
     status = "stopped" if stood[0] == "stopped" else "finished"
     environment = journal.number(journal.environment)
     certified = certificate is not None
-    journal.record(events.MarginsStarted(numbers=asked, environment=environment, rate=rate, error=error, budget=budget, certified=certified, status=status, before=stood[1]))
+    journal.record(
+        events.MarginsStarted(
+            numbers=asked,
+            environment=environment,
+            rate=rate,
+            error=error,
+            budget=budget,
+            certified=certified,
+            status=status,
+            before=stood[1],
+        )
+    )
 
 
 class _Search:
@@ -107,7 +136,9 @@ class _Search:
         self._control = control
         self._failures = failures_of(journal.file, journal.state)
         self._running: dict[int, Wanted] = {}
-        self._kept = frozenset(journal.state.environments[self._now.asked.environment].names(journal.state.elements))
+        self._kept = frozenset(
+            journal.state.environments[self._now.asked.environment].names(journal.state.elements)
+        )
         self._submitted = len(journal.state.tests)
         self._broken = 0
         left = beside(journal.state)
@@ -133,7 +164,9 @@ class _Search:
             if not asked and not self._running:
                 return
             for one in asked:
-                if not (self._pool.idle and self._control.may_start() and self._control.has_disk_space()):
+                if not (
+                    self._pool.idle and self._control.may_start() and self._control.has_disk_space()
+                ):
                     break
                 if one not in self._running.values():
                     self._start(one)
@@ -152,7 +185,9 @@ class _Search:
             used = sum(one.name != name for one in now.runs[now.before_call :])
             earlier = sum(one.name == name for one in now.runs[: now.before_call])
             first_look = self._looks < len(now.wanted) and len(now.wanted) > 1
-            most = earlier + min(known.FIRST_LOOK if first_look else known.MOST_OF_NUMBER, now.asked.budget - used)
+            most = earlier + min(
+                known.FIRST_LOOK if first_look else known.MOST_OF_NUMBER, now.asked.budget - used
+            )
             rule = known.Rule(tried.rate, tried.error)
             values = list(known.wanted(tried.asked, rule, known.known_of(now, name), most))
             # Later runs may have ended before earlier ones.
@@ -170,13 +205,19 @@ class _Search:
         runs = range(known.FIRST_FIX_RUN, known.FIRST_FIX_RUN + known.FIX_RUNS)
         for fix in known.fixes_of(self._now)[: known.MOST_FIXES]:
             if fix.confirmed is None:
-                fresh = {one.run for one in self._now.runs if (one.name, one.value) == (fix.name, fix.value)}
+                fresh = {
+                    one.run
+                    for one in self._now.runs
+                    if (one.name, one.value) == (fix.name, fix.value)
+                }
                 yield from ((fix.name, fix.value, run) for run in runs if run not in fresh)
             if fix.confirmed is not False:
                 return
 
     def _changes(self, name: str, value: float) -> tuple[tuple[str, float], ...]:
-        return known.changes_at(next(one.asked for one in self._now.numbers if one.asked.name == name), value)
+        return known.changes_at(
+            next(one.asked for one in self._now.numbers if one.asked.name == name), value
+        )
 
     def _is_impossible(self, name: str, value: float) -> bool:
         """Whether a value is not possible; that is recorded then."""
@@ -194,8 +235,14 @@ class _Search:
         seed = seed_of(self._parts[0].reduction, run)
         limit = wall_limit(self._journal.state)
         # Fresh runs are full ones, as those of a certificate.
-        ends = None if run >= known.FIRST_FIX_RUN or not self._journal.stops_early else ends_of(self._failures)
-        test = Run(keep=self._kept, seed=seed, ends=ends, limit=limit, changes=self._changes(name, value))
+        ends = (
+            None
+            if run >= known.FIRST_FIX_RUN or not self._journal.stops_early
+            else ends_of(self._failures)
+        )
+        test = Run(
+            keep=self._kept, seed=seed, ends=ends, limit=limit, changes=self._changes(name, value)
+        )
         self._pool.submit(self._submitted, test)
         self._control.started()
 
@@ -203,7 +250,9 @@ class _Search:
         data = result_data(result, self._failures)
         name, value, run = one
         seed = seed_of(self._parts[0].reduction, run)
-        kept = {key: data[key] for key in ("outcome", "failure", "distance", "end_pose", "wall_seconds")}
+        kept = {
+            key: data[key] for key in ("outcome", "failure", "distance", "end_pose", "wall_seconds")
+        }
         # Of each value, the run that can be played beside one of what is left.
         motions = motions_of(result) if run == self._beside else None
         ran = events.MarginRan(name=name, value=value, run=run, seed=seed, **kept)

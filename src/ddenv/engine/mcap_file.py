@@ -134,11 +134,18 @@ def write_mcap(run: Path, target: Path) -> list[str]:
     with RunFile(run) as file:
         subject = read_subject(file)
         if subject.scenario.oracle is not None:
-            raise UserError(f"{run}: a simulator of your own made it; only runs on Drake have streams to write")
+            raise UserError(
+                f"{run}: a simulator of your own made it; only runs on Drake have streams to write"
+            )
         state = fold(file.events())
-        chosen = [(name, state.test(number), rows_of(file, number)) for name, number in _chosen(file, state)]
+        chosen = [
+            (name, state.test(number), rows_of(file, number))
+            for name, number in _chosen(file, state)
+        ]
     if not chosen:
-        raise UserError(f"{run}: f is not known yet, so there is no run to write; run it first: ddenv resume {run}")
+        raise UserError(
+            f"{run}: f is not known yet, so there is no run to write; run it first: ddenv resume {run}"
+        )
     template = Variants(subject.world, subject.robot, subject.scenario)
     said = []
     output = BytesIO()
@@ -151,7 +158,9 @@ def write_mcap(run: Path, target: Path) -> list[str]:
         result = template.run(models, test.seed, listener=streams)
         # A test that ended early is written to its end.
         if not np.array_equal(result.trajectory[: len(rows)], rows):
-            raise UserError(f"{run}: test {test.id} gives different bits here: another Drake or processor made it")
+            raise UserError(
+                f"{run}: test {test.id} gives different bits here: another Drake or processor made it"
+            )
         for topic, kind, seconds, message in messages(name, models, result, streams, subject):
             whole = topic if topic.startswith("/") else f"/{name}/{topic}"
             writer.write_message(whole, schemas[kind], message, nanoseconds(seconds))
@@ -181,21 +190,32 @@ def _chosen(file: RunFile, state: RunState) -> Iterator[tuple[str, int]]:
             return
 
 
-def messages(run: str, models: frozenset[str], result: RunResult, streams: Streams, subject: Subject) -> Iterator[Row]:
+def messages(
+    run: str, models: frozenset[str], result: RunResult, streams: Streams, subject: Subject
+) -> Iterator[Row]:
     """What is still, what moved, and what the robot sensed and did in a run of these models."""
     goal = subject.scenario.goal
     removable = frozenset(subject.elements)
     base = f"{run}/base_link"
-    yield "goal", PLACE, 0.0, {"header": header(0.0, MAP), "pose": pose(Pose((goal.x, goal.y, 0.0)))}
+    yield (
+        "goal",
+        PLACE,
+        0.0,
+        {"header": header(0.0, MAP), "pose": pose(Pose((goal.x, goal.y, 0.0)))},
+    )
     drawn = []
     for model in subject.world.models:
         if model.name in models or model.name not in removable:
             # What moves is drawn in a frame of its own.
             frame = f"{run}/{model.name}" if model.name in result.motions else MAP
-            drawn.append((model, model.name, frame, LEFT_COLOR if model.name in models else ALWAYS_COLOR))
+            drawn.append(
+                (model, model.name, frame, LEFT_COLOR if model.name in models else ALWAYS_COLOR)
+            )
     yield "models", MARKERS, 0.0, _markers(drawn)
     yield "robot", MARKERS, 0.0, _markers([(subject.robot, "robot", base, ROBOT_COLOR)])
-    moved = {base: result.trajectory} | {f"{run}/{name}": rows for name, rows in result.motions.items()}
+    moved = {base: result.trajectory} | {
+        f"{run}/{name}": rows for name, rows in result.motions.items()
+    }
     for child, rows in moved.items():
         for seconds, *at in rows.tolist():
             yield TRANSFORMS, TF, seconds, {"transforms": [transform(seconds, MAP, child, at)]}
@@ -210,10 +230,17 @@ def messages(run: str, models: frozenset[str], result: RunResult, streams: Strea
             yield "cmd_wheels", WHEELS, reading.time, speeds
         else:
             asked = twist(command.speed, command.turn_rate)
-            yield "cmd_vel", TWIST, reading.time, {"header": header(reading.time, base), "twist": asked}
+            yield (
+                "cmd_vel",
+                TWIST,
+                reading.time,
+                {"header": header(reading.time, base), "twist": asked},
+            )
 
 
-def _sensed(reading: Reading, joints: Sequence[str], base: str, lidar: scenario.Lidar | None) -> Iterator[Row]:
+def _sensed(
+    reading: Reading, joints: Sequence[str], base: str, lidar: scenario.Lidar | None
+) -> Iterator[Row]:
     at = reading.time
     guess = reading.estimate
     covariance = [0.0] * 36
@@ -246,7 +273,9 @@ def _sensed(reading: Reading, joints: Sequence[str], base: str, lidar: scenario.
             at,
             {
                 "header": header(at, base),
-                "orientation": pose(Pose.from_rpy(0.0, 0.0, 0.0, imu.roll, imu.pitch, yaw))["orientation"],
+                "orientation": pose(Pose.from_rpy(0.0, 0.0, 0.0, imu.roll, imu.pitch, yaw))[
+                    "orientation"
+                ],
                 "angular_velocity": vector(0.0, 0.0, imu.yaw_rate),
                 # In ROS 2, -1 says that it is not measured.
                 "linear_acceleration_covariance": [-1.0, *[0.0] * 8],
@@ -277,7 +306,11 @@ def _sensed(reading: Reading, joints: Sequence[str], base: str, lidar: scenario.
 
 def _wheels(seconds: float, joints: Sequence[str], speeds: Sequence[float]) -> Message:
     """Speeds of wheel joints, rad/s."""
-    return {"header": header(seconds, ""), "name": list(joints), "velocity": [float(speed) for speed in speeds]}
+    return {
+        "header": header(seconds, ""),
+        "name": list(joints),
+        "velocity": [float(speed) for speed in speeds],
+    }
 
 
 def _markers(models: Iterable[tuple[Model, str, str, Color]]) -> Message:
@@ -287,7 +320,9 @@ def _markers(models: Iterable[tuple[Model, str, str, Color]]) -> Message:
         # Each visual, or each collision of a link that has none.
         for item in (item for link in model.links for item in link.visuals or link.collisions):
             own = item.color if isinstance(item, Visual) else None
-            drawn.append(marker(len(drawn) + 1, frame, name, origin @ item.pose, item.shape, own or color))
+            drawn.append(
+                marker(len(drawn) + 1, frame, name, origin @ item.pose, item.shape, own or color)
+            )
     return {"markers": [one for one in drawn if one]}
 
 
@@ -325,7 +360,9 @@ def pose(at: Pose) -> Message:
     return {"position": vector(*at.position), "orientation": turn(*at.quaternion)}
 
 
-def marker(number: int, frame: str, name: str, at: Pose, shape: Shape, color: Color) -> Message | None:
+def marker(
+    number: int, frame: str, name: str, at: Pose, shape: Shape, color: Color
+) -> Message | None:
     """A shape at `at` in `frame`; None for a plane, which has no end."""
     # The kind of marker, its size along its axes, m, and the corners of its triangles.
     kind = CUBE

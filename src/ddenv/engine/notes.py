@@ -56,7 +56,11 @@ def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal)
 def note_slow(journal: Journal, running: Iterable[tuple[Live, float]]) -> None:
     """Writes an event once a run of the whole world on Drake turns out to be slow. `running` tests took so long, s."""
     state = journal.state
-    if state.baseline is not None or state.scenario.get("oracle") is not None or "slow" in dict(state.notes):
+    if (
+        state.baseline is not None
+        or state.scenario.get("oracle") is not None
+        or "slow" in dict(state.notes)
+    ):
         return
     timeout = spec_of(state).timeout
     for live, real in running:

@@ -39,7 +39,11 @@ from ddenv.world.scenario import Scenario
 
 # A simulated step makes a thousand small allocations: with more of them cached by glibc, a step takes 59 us, not 75.
 # And a worker has one core: libraries that use threads would only slow down other workers.
-FOR_DRAKE = {"GLIBC_TUNABLES": "glibc.malloc.tcache_count=127", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+FOR_DRAKE = {
+    "GLIBC_TUNABLES": "glibc.malloc.tcache_count=127",
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+}
 
 _one_at_a_time = threading.Lock()
 
@@ -127,7 +131,13 @@ class Pool:
     """`jobs` workers on one scenario, each with a pipe of its own: whoever waits for a test is woken up as it ends."""
 
     def __init__(
-        self, scenario: Scenario, world: World, robot: Model, jobs: int, make: Make = simulator_of, at_a_time: int = 0
+        self,
+        scenario: Scenario,
+        world: World,
+        robot: Model,
+        jobs: int,
+        make: Make = simulator_of,
+        at_a_time: int = 0,
     ) -> None:
         """`make` makes the simulator in each worker. `at_a_time` tests share the machine's memory, `jobs` if not given. Raises
         UserError where Drake is needed and not installed.
@@ -169,7 +179,9 @@ class Pool:
         self._start(Job(test, replace(run, limit=limit), limit + self._margin))
 
     def _start(self, job: Job) -> _Slot:
-        slot = min((slot for slot in self._slots if slot.job is None), key=lambda slot: not slot.ready)
+        slot = min(
+            (slot for slot in self._slots if slot.job is None), key=lambda slot: not slot.ready
+        )
         slot.job = job
         slot.result = None
         self._hand_over(slot)
@@ -188,14 +200,20 @@ class Pool:
         """
         until = time.monotonic() + seconds
         self._look(0.0)
-        while not (ended := self._ended()) and self.busy and (left := until - time.monotonic()) > 0.0:
+        while (
+            not (ended := self._ended()) and self.busy and (left := until - time.monotonic()) > 0.0
+        ):
             self._look(min(left, CLOCK_PERIOD))
         return ended
 
     def _ended(self) -> list[Ended]:
         ended = []
         for slot in self._slots:
-            if slot.job is not None and slot.job.test is not None and isinstance(slot.result, RunResult | Broken):
+            if (
+                slot.job is not None
+                and slot.job.test is not None
+                and isinstance(slot.result, RunResult | Broken)
+            ):
                 ended.append((slot.job.test, slot.result))
                 slot.job = None
         if ended:
@@ -205,7 +223,9 @@ class Pool:
 
     def _look(self, seconds: float) -> None:
         """Waits at most `seconds` for an answer, output or a death. Replaces what died, kills what takes too long or too much."""
-        heard = set(wait([handle for slot in self._slots for handle in slot.worker.handles], seconds))
+        heard = set(
+            wait([handle for slot in self._slots for handle in slot.worker.handles], seconds)
+        )
         for slot in self._slots:
             if not heard.isdisjoint(slot.worker.handles):
                 self._listen(slot)
@@ -213,14 +233,19 @@ class Pool:
                 limit, what = (slot.job.limit, "") if slot.begun else (PREPARATION, " to prepare")
                 if slot.clock.look() > limit:
                     slot.worker.kill()
-                    self._replace(slot, Broken("timeout", f"took longer than {limit:g} s of wall clock{what}"))
+                    self._replace(
+                        slot, Broken("timeout", f"took longer than {limit:g} s of wall clock{what}")
+                    )
         if time.monotonic() >= self._next_memory:
             self._next_memory = time.monotonic() + MEMORY_PERIOD * max(1.0, len(self._slots) / FEW)
             for slot in self._slots:
                 if slot.worker.memory() > self._memory:
                     slot.worker.kill()
                     most = f"{self._memory / GIGABYTE:.3g} GB of memory"
-                    self._lose(slot, f"used more than {most} (simulation.memory_limit, or fewer --jobs, allows more)")
+                    self._lose(
+                        slot,
+                        f"used more than {most} (simulation.memory_limit, or fewer --jobs, allows more)",
+                    )
 
     def _listen(self, slot: _Slot) -> None:
         try:
@@ -280,11 +305,20 @@ class Pool:
 
     def live(self) -> list[tuple[Live, float]]:
         """The running tests that have begun to move, and how long each took so far, s of real time."""
-        running = [(number, slot, slot.job.test, slot.moment) for number, slot in enumerate(self._slots) if slot.job]
+        running = [
+            (number, slot, slot.job.test, slot.moment)
+            for number, slot in enumerate(self._slots)
+            if slot.job
+        ]
         return [
-            (Live(slot=number, test=test, time=now.time, pose=now.pose, models=now.models), slot.clock.look())
+            (
+                Live(slot=number, test=test, time=now.time, pose=now.pose, models=now.models),
+                slot.clock.look(),
+            )
             for number, slot, test, now in running
-            if test is not None and now is not None and all(map(math.isfinite, (now.time, *now.pose)))
+            if test is not None
+            and now is not None
+            and all(map(math.isfinite, (now.time, *now.pose)))
         ]
 
     def close(self) -> None:

@@ -59,10 +59,18 @@ def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key,
             continue
         # Files that cannot be read are skipped.
         with suppress(UserError, KeyError, TypeError), RunFile(path) as other:
-            ours, theirs = (next((each.event for each in file.events(most=1)), None) for file in (run, other))
+            ours, theirs = (
+                next((each.event for each in file.events(most=1)), None) for file in (run, other)
+            )
             # Both are asked for tests of the same models in the same world.
-            alike = isinstance(ours, Created) and isinstance(theirs, Created) and _asked(ours) == _asked(theirs)
-            documents = alike and all(run.documents(n) == other.documents(n) for n in ("world", "robot", "resource "))
+            alike = (
+                isinstance(ours, Created)
+                and isinstance(theirs, Created)
+                and _asked(ours) == _asked(theirs)
+            )
+            documents = alike and all(
+                run.documents(n) == other.documents(n) for n in ("world", "robot", "resource ")
+            )
             written = other.events() if documents else []
             engines = (each.event for each in written if isinstance(each.event, EngineStarted))
             made_by = {(one.version, one.simulator, one.machine) for one in engines}
@@ -74,7 +82,11 @@ def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key,
 def _tests_of(path: Path, state: RunState) -> Iterator[tuple[Key, Place]]:
     for test in state.tests:
         # Another run implies for itself. What ended early there was decided by where f ended there.
-        if test.outcome in ("pass", "similar", "other", "failed") and test.implied_by is None and not test.cut:
+        if (
+            test.outcome in ("pass", "similar", "other", "failed")
+            and test.implied_by is None
+            and not test.cut
+        ):
             yield (frozenset(state.models_of(test)), test.seed), Place(path, test, state.elements)
 
 
@@ -107,7 +119,9 @@ def result_of(place: Place) -> RunResult | None:
         motions=motions,
         first_sensed=dict(test.first_sensed),
         first_touched=dict(test.first_touched),
-        took_part=None if test.took_part is None else frozenset(test.took_part.names(place.elements)),
+        took_part=None
+        if test.took_part is None
+        else frozenset(test.took_part.names(place.elements)),
         taken=place.path.stem,
         **{name: getattr(test, name) for name in same},
     )

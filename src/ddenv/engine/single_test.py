@@ -48,7 +48,9 @@ class Trial:
 def in_simulator(subject: Subject, simulator: Oracle, robot: Path) -> Subject:
     """The same, in this simulator in place of the scenario's own; it finds the robot in the file `robot`."""
     there = subject.scenario.robot.model_copy(update={"model": robot})
-    return replace(subject, scenario=subject.scenario.model_copy(update={"oracle": simulator, "robot": there}))
+    return replace(
+        subject, scenario=subject.scenario.model_copy(update={"oracle": simulator, "robot": there})
+    )
 
 
 def plan(
@@ -67,22 +69,30 @@ def plan(
     models = _models(subject, keep, minimal)
     if test is not None:
         if minimal or keep is not None or seed is not None:
-            raise UserError("--test: has models and a seed of its own; leave out --keep, --minimal and --seed")
+            raise UserError(
+                "--test: has models and a seed of its own; leave out --keep, --minimal and --seed"
+            )
         state = subject.state
         if state is None:
             raise UserError("--test: needs a run; a scenario has no tests yet")
         if not 0 < test <= len(state.tests):
-            raise UserError(f"--test: there is no test {test}; the run has tests 1 to {len(state.tests)}")
+            raise UserError(
+                f"--test: there is no test {test}; the run has tests 1 to {len(state.tests)}"
+            )
         recorded = state.test(test)
         models = state.models_of(recorded)
         seed = recorded.seed
     for name in leave_out or []:
         if name not in models:
-            raise UserError(f"--leave-out: '{name}' is not one of the {len(models)} models in this world")
+            raise UserError(
+                f"--leave-out: '{name}' is not one of the {len(models)} models in this world"
+            )
     models = tuple(name for name in models if name not in (leave_out or []))
     reduction = subject.scenario.reduction
     runs = range(first_run, first_run + repeat)
-    seeds = [seed_of(reduction, run) for run in runs] if seed is None else range(seed, seed + repeat)
+    seeds = (
+        [seed_of(reduction, run) for run in runs] if seed is None else range(seed, seed + repeat)
+    )
     keeps: list[tuple[frozenset[str], str | None]] = [(frozenset(models), None)]
     if leave_each_out:
         keeps += [(frozenset(models) - {name}, name) for name in models]
@@ -117,7 +127,9 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[Dat
             failures = failures_of(file, state)
             repeated = state.tests_of(trial.of for trial in trials if trial.of is not None)
             tests = {
-                test.id: (test, table(file.motion(test.id) or array("d"))) for test in repeated if test.is_finished
+                test.id: (test, table(file.motion(test.id) or array("d")))
+                for test in repeated
+                if test.is_finished
             }
     pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
     results: dict[int, Data] = {}
@@ -133,7 +145,9 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[Dat
                 results[index] = asked | result_data(result, failures)
                 if trial.of is not None and trial.of in tests:
                     test, rows = tests[trial.of]
-                    same = isinstance(result, RunResult) and np.array_equal(result.trajectory[: len(rows)], rows)
+                    same = isinstance(result, RunResult) and np.array_equal(
+                        result.trajectory[: len(rows)], rows
+                    )
                     results[index]["recorded"] = beside_record(test, results[index], same)
             while shown in results:
                 yield results.pop(shown)
@@ -189,11 +203,15 @@ def expected(subject: Subject, where: object) -> Certificate:
         what = "no certificate says how often what is left fails"
         raise UserError(f"{where}: {what}; make one first: ddenv certify {where}")
     if not found.claims[0].low and not found.seeds:
-        raise UserError(f"{where}: no fresh run of what is left showed f, so there is nothing to reproduce")
+        raise UserError(
+            f"{where}: no fresh run of what is left showed f, so there is nothing to reproduce"
+        )
     return found
 
 
-def reproduce(subject: Subject, certificate: Certificate, most: int, jobs: int) -> Iterator[tuple[Data, Reproduction]]:
+def reproduce(
+    subject: Subject, certificate: Certificate, most: int, jobs: int
+) -> Iterator[tuple[Data, Reproduction]]:
     """Runs what is left with fresh seeds, at most `most` times, until it is known whether f shows at the rate that its certificate
     expects; where chosen runs were reduced, with their seeds, of which each has to show f. Yields each run's result, and what all
     of them show together.
@@ -206,7 +224,9 @@ def reproduce(subject: Subject, certificate: Certificate, most: int, jobs: int) 
     trials = plan(subject, minimal=True, first_run=FIRST_RUN, repeat=most)
     if seeds and state is not None:
         # The search has made these runs; how they compare with its records is said, too.
-        known = {test.seed: test.id for test in state.tests if state.models_of(test) == state.environment}
+        known = {
+            test.seed: test.id for test in state.tests if state.models_of(test) == state.environment
+        }
         trials = [trial for seed in seeds for trial in plan(subject, test=known[seed])]
     for result in run_trials(subject, trials, jobs):
         if result["outcome"] in BROKEN:
@@ -215,6 +235,15 @@ def reproduce(subject: Subject, certificate: Certificate, most: int, jobs: int) 
             shown.append(result["outcome"] == "similar")
         exact = None if all(shown) and len(shown) < len(seeds) else all(shown)
         fails = exact if seeds else shows_at(shown, rate)
-        yield result, Reproduction(fails=fails, shown=sum(shown), runs=len(shown), broken=broken, said=still_fails(fails, certificate))
+        yield (
+            result,
+            Reproduction(
+                fails=fails,
+                shown=sum(shown),
+                runs=len(shown),
+                broken=broken,
+                said=still_fails(fails, certificate),
+            ),
+        )
         if fails is not None or broken > MOST_BROKEN:
             return

@@ -34,7 +34,11 @@ def slice_environment(journal: Journal) -> bool:
     if state.accept_mode == "ask" or not any(test.shows_f for test in tests):
         return False
     reduction = state.scenario["reduction"]
-    if state.node and reduction["accept_rate"] == "kept" and fresh_chance(met) > 1.0 - reduction["keep_rate"]:
+    if (
+        state.node
+        and reduction["accept_rate"] == "kept"
+        and fresh_chance(met) > 1.0 - reduction["keep_rate"]
+    ):
         return False
     left = journal.pinned
     for models in met:
@@ -51,7 +55,14 @@ def slice_environment(journal: Journal) -> bool:
         return False
     audit = audit_is_due(state)
     chose = tuple(test.id for test in tests)
-    journal.record(Sliced(environment=journal.number(left), tests=chose, evidence_test=state.evidence_test, audit=audit))
+    journal.record(
+        Sliced(
+            environment=journal.number(left),
+            tests=chose,
+            evidence_test=state.evidence_test,
+            audit=audit,
+        )
+    )
     return True
 
 
@@ -63,7 +74,11 @@ def slice_audit(journal: Journal) -> tuple[Wanted, ...]:
         return ()
     environment = journal.environment
     run = state.test(here.evidence_test).run
-    return () if journal.test(environment, run) is not None else (Wanted(environment=environment, run=run, why="audit"),)
+    return (
+        ()
+        if journal.test(environment, run) is not None
+        else (Wanted(environment=environment, run=run, why="audit"),)
+    )
 
 
 def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Environment]]:
@@ -80,7 +95,11 @@ def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Envir
         if exact and (test.run not in exact or not test.shows_f):
             continue
         environment = journal.state.environments[test.environment]
-        if ties is not None and test.took_part is not None and implies(test.took_part, environment, there, ties):
+        if (
+            ties is not None
+            and test.took_part is not None
+            and implies(test.took_part, environment, there, ties)
+        ):
             tests.append(test)
             met[test.run] = met.get(test.run, NOTHING) | test.took_part
         elif environment == there:
@@ -92,7 +111,11 @@ def audit_is_due(state: RunState, phase: str = "") -> bool:
     """Whether the next implied test has to be simulated: one in `audit`; in the `phase` of a certificate each, while cheap."""
     if phase == CERTIFY:
         made = [test for test in state.finished_tests if test.implied_by is None]
-        audits = sum(test.simulated_seconds for test in made if test.audits is not None and test.phase == CERTIFY)
+        audits = sum(
+            test.simulated_seconds
+            for test in made
+            if test.audits is not None and test.phase == CERTIFY
+        )
         if audits <= CHEAP * sum(test.simulated_seconds for test in made):
             return True
     every = read(state.scenario, SETTINGS["audit"])
@@ -107,7 +130,9 @@ def compare(journal: Journal, audits: Iterable[Test]) -> None:
     if wrong is None or wrong.audits is None or state.refuted is not None:
         return
     sound = takewhile(lambda node: not rests_on_slices(state, node), state.path)
-    journal.record(SlicesRefuted(test=wrong.id, by=wrong.audits, node=[node.number for node in sound][-1]))
+    journal.record(
+        SlicesRefuted(test=wrong.id, by=wrong.audits, node=[node.number for node in sound][-1])
+    )
 
 
 def repeats(journal: Journal, audit: Test) -> bool:
@@ -118,7 +143,9 @@ def repeats(journal: Journal, audit: Test) -> bool:
     source = state.test(audit.audits)
     # What took no part may have moved by itself.
     gone = (state.environments[0] - state.environments[audit.environment]).names(state.elements)
-    first = {name: rows for name, rows in journal.file.motions(source.id).items() if name not in gone}
+    first = {
+        name: rows for name, rows in journal.file.motions(source.id).items() if name not in gone
+    }
     took_part = frozenset((source.took_part or NOTHING).names(state.elements))
     same_end = _end(source, took_part) == _end(audit, took_part) and first.keys() == again.keys()
     return same_end and all(first[name].tobytes() == again[name].tobytes() for name in first)

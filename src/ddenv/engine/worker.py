@@ -190,7 +190,9 @@ def _settle_in(output: Connection) -> None:
     threading.Thread(target=follow, daemon=True).start()
 
 
-def answered(task: Task, simulator: Simulator | Exception, tell: Callable[[Moment], object]) -> Answer:
+def answered(
+    task: Task, simulator: Simulator | Exception, tell: Callable[[Moment], object]
+) -> Answer:
     """Does a task, and tells the moments of a test. The traceback of what nobody foresaw is printed."""
     try:
         if isinstance(simulator, Exception):
@@ -228,7 +230,14 @@ def _progress(tell: Callable[[Moment], object]) -> Progress:
             starts = models
         if now >= due:
             due = now + PERIOD
-            tell(Moment(begun, time_s, pose, {name: at for name, at in models.items() if at != starts.get(name)}))
+            tell(
+                Moment(
+                    begun,
+                    time_s,
+                    pose,
+                    {name: at for name, at in models.items() if at != starts.get(name)},
+                )
+            )
 
     return report
 
@@ -236,7 +245,11 @@ def _progress(tell: Callable[[Moment], object]) -> Progress:
 def reason_of(error: BaseException) -> str:
     """An exception in one line."""
     text = " ".join(str(error).split())
-    words = text if isinstance(error, UserError) else f"{type(error).__name__}{': ' if text else ''}{text}"
+    words = (
+        text
+        if isinstance(error, UserError)
+        else f"{type(error).__name__}{': ' if text else ''}{text}"
+    )
     return printable(words)[:REASON]
 
 

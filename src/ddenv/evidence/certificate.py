@@ -20,10 +20,28 @@ from functools import lru_cache
 from typing import Literal
 
 from ddenv.environment import Environment
-from ddenv.evidence.rates import HIGHEST_RATE, Interval, Shown, ShownIn, iterations_needed, wilson_interval
+from ddenv.evidence.rates import (
+    HIGHEST_RATE,
+    Interval,
+    Shown,
+    ShownIn,
+    iterations_needed,
+    wilson_interval,
+)
 
 Verdict = Literal[
-    "", "kept", "lost", "exact", "needed", "helps", "rarer", "not needed", "passes", "fails", "not shown", "unknown"
+    "",
+    "kept",
+    "lost",
+    "exact",
+    "needed",
+    "helps",
+    "rarer",
+    "not needed",
+    "passes",
+    "fails",
+    "not shown",
+    "unknown",
 ]
 # Without these models f is rarer, but not shown to be rare enough. "helps": it is shown not to be that rare.
 HELPING = ("helps", "rarer")
@@ -101,7 +119,9 @@ class Terms:
 
     def error_of_models(self, kept: float | None) -> float:
         """The chance of error of a claim about a model where so much of the rate is shown to be kept."""
-        return self.error * (IN_TURN if kept is not None and kept >= self.in_turn else 1.0 - IN_TURN)
+        return self.error * (
+            IN_TURN if kept is not None and kept >= self.in_turn else 1.0 - IN_TURN
+        )
 
 
 def vain_after(rate: float) -> int:
@@ -124,7 +144,11 @@ class Pairs:
 
     def after(self, first: bool, second: bool) -> Pairs:
         """The pairs with one more."""
-        return Pairs(self.both + (first and second), self.first + (first > second), self.second + (second > first))
+        return Pairs(
+            self.both + (first and second),
+            self.first + (first > second),
+            self.second + (second > first),
+        )
 
     def above(self, share: float) -> float:
         """The wealth of the bet that the first shows f at more than `share` (above 0) of the rate of the second."""
@@ -223,8 +247,13 @@ class Settling:
             known = tuple(shown(*test) for test in wanted.tests)
             if None in known:
                 last = wanted.tests[-1][1]
-                later = ((subject, last + more) for more in range(1, ahead) for subject in wanted.later)
-                missing = (tuple(test for test in of if shown(*test) is None) for of in (wanted.tests, later))
+                later = (
+                    (subject, last + more) for more in range(1, ahead) for subject in wanted.later
+                )
+                missing = (
+                    tuple(test for test in of if shown(*test) is None)
+                    for of in (wanted.tests, later)
+                )
                 now, then = missing
                 return Claim(
                     verdict="",
@@ -323,7 +352,11 @@ def _shows(whole: Environment, terms: Terms) -> Procedure:
 
 
 def falls(
-    without: Environment, left: Environment, error: float, share: float = NEEDED_SHARE, first: int = 0
+    without: Environment,
+    left: Environment,
+    error: float,
+    share: float = NEEDED_SHARE,
+    first: int = 0,
 ) -> Procedure:
     """How often f shows in `without`, as a part of its rate in `left`; "needed" if at most `share`. Runs begin at `first`.
 
@@ -336,7 +369,9 @@ def falls(
     bound = 1.0
     rarer = False
     for run in range(MOST_REMOVAL_PAIRS):
-        mine, theirs = yield Wanted(((without, first + run), (left, first + run)), (without, left), bound)
+        mine, theirs = yield Wanted(
+            ((without, first + run), (left, first + run)), (without, left), bound
+        )
         assumed = assumed.after(mine is not False, theirs is True)
         sound = sound.after(mine is True, theirs is not False)
         bound = assumed.at_most(error, bound)
@@ -346,10 +381,18 @@ def falls(
         often = sound.above(share)
         if often >= REFUTED:
             return "helps" if rarer else "not needed", bound
-        if rarer and often < NEARLY * REFUTED and run + 1 >= HELPS_AFTER and assumed.share >= HELPS_SHARE:
+        if (
+            rarer
+            and often < NEARLY * REFUTED
+            and run + 1 >= HELPS_AFTER
+            and assumed.share >= HELPS_SHARE
+        ):
             return "rarer", bound
         likeliest = max(often * error * REFUTED, assumed.below(share))
-        if run + 1 >= FEWEST_PAIRS and likeliest ** (HOPE * MOST_REMOVAL_PAIRS / (run + 1)) < 1.0 / error:
+        if (
+            run + 1 >= FEWEST_PAIRS
+            and likeliest ** (HOPE * MOST_REMOVAL_PAIRS / (run + 1)) < 1.0 / error
+        ):
             break
     about_as_often = assumed.second + assumed.both > 0 and assumed.share >= ABOUT_AS_OFTEN
     return ("rarer" if rarer else "not needed" if about_as_often else "not shown"), bound
@@ -391,7 +434,9 @@ NEEDS = 1.0 / (IN_TURN * error_of(1))
 EIGHT_OF_TEN = 1.28
 
 
-def certificate_tests(rate: float, certify_rate: float, left: int, at_least: int, seen: int = 0) -> Expected:
+def certificate_tests(
+    rate: float, certify_rate: float, left: int, at_least: int, seen: int = 0
+) -> Expected:
     """Tests of a certificate of `left` needed models, as (low, likely, high): about seven of ten or more take
     between low and high, if f never shows without one of these models.
 
@@ -416,7 +461,9 @@ def _factors(ends: Sequence[float]) -> Interval:
     return shorter, math.exp(math.hypot(math.log(LONGER), math.log(max(ends) / ends[0])))
 
 
-def certificate_from_here(made: int, left_runs: int, open_pairs: Sequence[int], seen: Pairs, runs: int) -> Expected:
+def certificate_from_here(
+    made: int, left_runs: int, open_pairs: Sequence[int], seen: Pairs, runs: int
+) -> Expected:
     """The same once removals have shown something: `made` tests so far, `left_runs` of them of what is left.
 
     Each claim about a model that is not decided has so many `open_pairs`. `runs` pairs of all removals were as `seen`.
@@ -426,7 +473,9 @@ def certificate_from_here(made: int, left_runs: int, open_pairs: Sequence[int], 
     ends = []
     for share in (second, *wilson_interval(seen.second, runs, EIGHT_OF_TEN)):
         each = _removal_pairs(max(0.0, with_it - share), seen.first / runs, max(share, 0.01))
-        ends.append(sum(max(1.0, each - pairs) for pairs in open_pairs) + max(1.0, each - left_runs))
+        ends.append(
+            sum(max(1.0, each - pairs) for pairs in open_pairs) + max(1.0, each - left_runs)
+        )
     shorter, longer = _factors(ends)
     # A model that is not needed ends the certificate.
     fewest = ends[0] / shorter if seen.share < NEEDED_SHARE else 0.0
@@ -438,7 +487,9 @@ def _removal_pairs(both: float, first: float, second: float) -> float:
     kinds = both, first, second
     needed = _until(NEEDS, kinds, (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE))
     refuted = _until(REFUTED, kinds, (1.0 / NEEDED_SHARE - 1.0, 1.0 / NEEDED_SHARE, -1.0))
-    given_up = FEWEST_PAIRS if min(needed, refuted) > HOPE * MOST_REMOVAL_PAIRS else MOST_REMOVAL_PAIRS
+    given_up = (
+        FEWEST_PAIRS if min(needed, refuted) > HOPE * MOST_REMOVAL_PAIRS else MOST_REMOVAL_PAIRS
+    )
     return min(needed, refuted, float(given_up))
 
 
@@ -454,7 +505,9 @@ def _expected(rate: float, certify_rate: float, left: int, at_least: int) -> flo
         of_left = max(float(at_least), _until(NEEDS, (rate, 0.0, rate - both), kept))
         of_whole = of_left * (1.0 - rate)
     else:
-        of_left = of_whole = min(float(MOST_PAIRS), max(float(at_least), _until(NEEDS, pairs, kept)))
+        of_left = of_whole = min(
+            float(MOST_PAIRS), max(float(at_least), _until(NEEDS, pairs, kept))
+        )
     needed = (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE)
     removal = _until(NEEDS, (0.0, 0.0, rate), needed)
     removal = removal if removal <= MOST_REMOVAL_PAIRS else HELPS_AFTER
@@ -465,13 +518,23 @@ def _expected(rate: float, certify_rate: float, left: int, at_least: int) -> flo
 def tests_in_blocks(rate: float, certify_rate: float, left: int) -> int:
     """How many tests a certificate without seeds takes on average, where without any of `left` models f never shows."""
     both = rate * rate
-    blocks = _until(NEEDS, (both, rate - both, rate - both), (1.0 / certify_rate - 1.0, 1.0 / certify_rate, -1.0))
+    blocks = _until(
+        NEEDS,
+        (both, rate - both, rate - both),
+        (1.0 / certify_rate - 1.0, 1.0 / certify_rate, -1.0),
+    )
     removal = _until(NEEDS, (0.0, 0.0, rate), (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE))
     return round(2.0 * blocks + left * removal)
 
 
-def _until(wealth: float, shares: tuple[float, float, float], gains: tuple[float, float, float]) -> float:
+def _until(
+    wealth: float, shares: tuple[float, float, float], gains: tuple[float, float, float]
+) -> float:
     """After how many pairs a bet has this wealth, on average. `shares` of all pairs have these `gains`."""
     pairs = tuple(zip(shares, gains, strict=True))
-    growths = {stake: sum(share * math.log1p(stake * gain) for share, gain in pairs) for stake in STAKES}
-    return min(math.log(wealth / STAKES[stake]) / max(1e-4, growth) for stake, growth in growths.items())
+    growths = {
+        stake: sum(share * math.log1p(stake * gain) for share, gain in pairs) for stake in STAKES
+    }
+    return min(
+        math.log(wealth / STAKES[stake]) / max(1e-4, growth) for stake, growth in growths.items()
+    )

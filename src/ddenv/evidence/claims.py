@@ -39,7 +39,11 @@ def is_minimal(certificate: Certificate) -> bool:
     """Whether a certificate shows that what is left keeps the rate of the same failure, and that each model in it is needed."""
     claims = certificate.claims
     kept = bool(claims) and (claims[0].verdict == "kept" or bool(certificate.seeds))
-    return kept and certificate.elsewhere is None and all(claim.verdict == "needed" for claim in claims[1:])
+    return (
+        kept
+        and certificate.elsewhere is None
+        and all(claim.verdict == "needed" for claim in claims[1:])
+    )
 
 
 def helping(certificate: Certificate) -> Names:
@@ -93,7 +97,10 @@ def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settle
         return {None: settle(often(left, terms.at_least), shown)}
     kept = settle(keeps(left, whole, terms), shown)
     error = terms.error_of_models(kept.bound)
-    return {None: kept, **{name: settle(falls(rest, left, error), shown) for name, rest in rests.items()}}
+    return {
+        None: kept,
+        **{name: settle(falls(rest, left, error), shown) for name, rest in rests.items()},
+    }
 
 
 def _outcomes(state: RunState, certificate: Certificate) -> dict[NumberedRun, Shown]:
@@ -107,19 +114,27 @@ def _outcomes(state: RunState, certificate: Certificate) -> dict[NumberedRun, Sh
 
 
 def _finished(state: RunState, certificate: Certificate) -> list[Test]:
-    return [test for test in state.confirm_tests if test.run >= certificate.first_run and test.is_finished]
+    return [
+        test
+        for test in state.confirm_tests
+        if test.run >= certificate.first_run and test.is_finished
+    ]
 
 
 def never_left_out(state: RunState, certificate: Certificate) -> int:
     """How many models of a finished certificate's environment no run leaves out: those that were pinned, with their stacks."""
     there = state.nodes[certificate.node].environment
-    gone = {name for claim in certificate.claims for name in stack_with(state, there, claim.without)}
+    gone = {
+        name for claim in certificate.claims for name in stack_with(state, there, claim.without)
+    }
     return len(there) - len(gone) if is_minimal(certificate) else 0
 
 
 def is_nearest(one: Isolation) -> bool:
     """Whether fresh runs show that a world passes, and that it does not with any one model put back."""
-    return one.found is not None and all(claim.verdict in ("passes", "needed") for claim in one.checks[-1].claims)
+    return one.found is not None and all(
+        claim.verdict in ("passes", "needed") for claim in one.checks[-1].claims
+    )
 
 
 def current(state: RunState) -> Certificate | None:
@@ -137,7 +152,11 @@ def runs_behind(state: RunState, certificate: Certificate, claim: Claim) -> tupl
         own = [test for test in rested_on(state) if test.run in chosen and test.phase != CERTIFY]
     else:
         fresh = (test for test in state.confirm_tests if state.rests_on >> test.id & 1)
-        own = [test for test in fresh if test.node == certificate.node and test.run >= certificate.first_run]
+        own = [
+            test
+            for test in fresh
+            if test.node == certificate.node and test.run >= certificate.first_run
+        ]
     finished = (test for test in own if test.environment == claim.environment and test.is_finished)
     return tuple({test.run: test for test in finished if not test.broke}.values())
 
@@ -162,7 +181,9 @@ def failing_instead(state: RunState, certificate: Certificate, claim: Claim) -> 
     ends = Counter(test.failure if test.outcome == "other" else "pass" for test in runs)
     if not ends or (failure := ends.most_common(1)[0][0]) == "pass":
         return None
-    away = [test.distance for test in runs if test.failure == failure and test.distance is not None] or [math.nan]
+    away = [
+        test.distance for test in runs if test.failure == failure and test.distance is not None
+    ] or [math.nan]
     return Instead(failure, ends[failure], median(away), max(away))
 
 
@@ -200,7 +221,9 @@ def expected_fresh_runs(state: RunState, now: Certificate) -> Expected:
             seen = seen.after(without, with_it)
     undecided = [made for made, claim in zip(pairs, removals, strict=True) if not claim.verdict]
     undecided += [0] * (left - len(removals))
-    left_runs = sum(environment == state.environments[state.nodes[now.node].id] for environment, _ in outcomes)
+    left_runs = sum(
+        environment == state.environments[state.nodes[now.node].id] for environment, _ in outcomes
+    )
     return certificate_from_here(len(outcomes), left_runs, undecided, seen, sum(pairs))
 
 
@@ -245,7 +268,11 @@ class FreshRuns:
         """That "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing is shown yet."""
         if self.bound is None or (self.bound >= 1.0 if self.without else self.bound <= 0.0):
             return ""
-        return f"≤ {percent_at_most(self.bound)}" if self.without else f"≥ {percent_at_least(self.bound)}"
+        return (
+            f"≤ {percent_at_most(self.bound)}"
+            if self.without
+            else f"≥ {percent_at_least(self.bound)}"
+        )
 
     @property
     def shows(self) -> str:
@@ -267,11 +294,15 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
         tests.setdefault((test.node, test.without), []).append(test)
     claims = {claim.without: claim for claim in certificate.claims}
     # Stacks that are kept together are named by their first models. Where the rate is lost, nothing is claimed of removals.
-    free = (stack[0] for stack in stacks_of(state, state.environment) if state.pinned.isdisjoint(stack))
+    free = (
+        stack[0] for stack in stacks_of(state, state.environment) if state.pinned.isdisjoint(stack)
+    )
     removals = [name for name in free if name in claims or not (claims or certificate.seeds)]
     keys = [(certificate.node, None), *((certificate.node, name) for name in removals)]
     first = origin(state, certificate.node).number
-    earlier = sorted((key for key in tests if key not in keys and key != (first, None)), key=lambda key: -key[0])
+    earlier = sorted(
+        (key for key in tests if key not in keys and key != (first, None)), key=lambda key: -key[0]
+    )
     keys += earlier
     # A finished certificate need not have run the whole world.
     if certificate.node != first and (not (claims or certificate.seeds) or (first, None) in tests):
@@ -312,8 +343,14 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
             running=running,
         )
         found.append(undecided)
-    bounds = {} if claims else {without: claim.bound for without, claim in so_far(state, certificate).items()}
-    left_runs, whole_runs = ({test.run for test in tests.get((node, None), [])} for node in (certificate.node, first))
+    bounds = (
+        {}
+        if claims
+        else {without: claim.bound for without, claim in so_far(state, certificate).items()}
+    )
+    left_runs, whole_runs = (
+        {test.run for test in tests.get((node, None), [])} for node in (certificate.node, first)
+    )
     for place, one in enumerate(found):
         bound = one.bound if one.claim or one.node != certificate.node else bounds.get(one.without)
         is_chosen = one.node == first != certificate.node and whole_runs < left_runs

@@ -66,7 +66,9 @@ def groups_of(ends: Sequence[Place], epsilon: float) -> Groups | None:
         groups = [np.flatnonzero(labels == label) for label in range(1, labels.max() + 1)]
         large = [group for group in groups if len(group) >= FEW]
         if len(large) > 1 and apart >= APART * max(pdist(places[group]).max() for group in large):
-            by_size = sorted((tuple(group.tolist()) for group in large), key=lambda group: (-len(group), group))
+            by_size = sorted(
+                (tuple(group.tolist()) for group in large), key=lambda group: (-len(group), group)
+            )
             return Groups(tuple(by_size), float(apart))
     return None
 
@@ -87,7 +89,9 @@ def joining(reach: float) -> float:
     return float(f"{math.ceil(more / step - 1e-9) * step:.3g}")
 
 
-def elsewhere(whole: Sequence[Place], left: Sequence[Place], epsilon: float) -> EndsElsewhere | None:
+def elsewhere(
+    whole: Sequence[Place], left: Sequence[Place], epsilon: float
+) -> EndsElsewhere | None:
     """Where the runs of the whole world often ended with f, and those of what is left hardly do; None if there is no such place.
 
     For each group of all these ends the exact test of Fisher compares how many of both are in it.
@@ -101,7 +105,17 @@ def elsewhere(whole: Sequence[Place], left: Sequence[Place], epsilon: float) -> 
         there = sum(one < len(whole) for one in group)
         here = len(group) - there
         # By chance no more than `here` of the ends in this group would be of what is left.
-        ways = sum(math.comb(len(left), one) * math.comb(len(whole), len(group) - one) for one in range(here + 1))
+        ways = sum(
+            math.comb(len(left), one) * math.comb(len(whole), len(group) - one)
+            for one in range(here + 1)
+        )
         if ways / math.comb(len(whole) + len(left), len(group)) <= ERROR / len(found.groups):
-            return EndsElsewhere(apart=found.apart, epsilon=found.epsilon, whole=there, of_whole=len(whole), left=here, of_left=len(left))
+            return EndsElsewhere(
+                apart=found.apart,
+                epsilon=found.epsilon,
+                whole=there,
+                of_whole=len(whole),
+                left=here,
+                of_left=len(left),
+            )
     return None

@@ -82,7 +82,11 @@ class Rule:
     def surely_needed(self, outcomes: Sequence[str]) -> int:
         """How many more runs a value needs at least, whatever they show; 0 if it is decided."""
         alike = ("similar", "pass", "other")
-        return next(more for more in count() if any(self.verdict([*outcomes, *[each] * more]) for each in alike))
+        return next(
+            more
+            for more in count()
+            if any(self.verdict([*outcomes, *[each] * more]) for each in alike)
+        )
 
 
 def error_each(rate: float, runs: int) -> float:
@@ -104,11 +108,19 @@ class Known:
     def values(self, rule: Rule) -> list[Value]:
         """All values that were tried, the lowest first."""
         judged = [
-            Value(value=value, verdict=rule.verdict(found), outcomes=tuple(found), failures=tuple(self.failures.get(value, ())))
+            Value(
+                value=value,
+                verdict=rule.verdict(found),
+                outcomes=tuple(found),
+                failures=tuple(self.failures.get(value, ())),
+            )
             for value, found in self.outcomes.items()
             if value not in self.impossible
         ]
-        judged += [Value(value=value, verdict="impossible", why=why) for value, why in self.impossible.items()]
+        judged += [
+            Value(value=value, verdict="impossible", why=why)
+            for value, why in self.impossible.items()
+        ]
         return sorted(judged, key=lambda one: one.value)
 
 
@@ -166,10 +178,19 @@ def margin_of(asked: NumberAsked, rule: Rule, known: Known) -> Margin:
 
 
 def _side(asked: NumberAsked, up: bool, tried: Sequence[Value]) -> Side:
-    gone = next((at for at, one in enumerate(tried) if one.verdict in ("goal", "other", "impossible")), len(tried))
+    gone = next(
+        (at for at, one in enumerate(tried) if one.verdict in ("goal", "other", "impossible")),
+        len(tried),
+    )
     shows = [[one for one in part if one.verdict == "f"] for part in (tried[:gone], tried[gone:])]
     until, again = (part[-1] if part else None for part in shows)
-    side = Side(up=up, tried=tuple(tried), end=asked.high if up else asked.low, until=until, gone=None if gone == len(tried) else tried[gone])
+    side = Side(
+        up=up,
+        tried=tuple(tried),
+        end=asked.high if up else asked.low,
+        until=until,
+        gone=None if gone == len(tried) else tried[gone],
+    )
     first = next((at for at, one in enumerate(tried) if one.verdict == "goal"), None)
     if first is None:
         return replace(side, again=again)
@@ -185,7 +206,10 @@ def known_of(margins: Margins, name: str) -> Known:
     for one in margins.runs:
         if one.name == name and one.run < FIRST_FIX_RUN:
             runs.setdefault(one.value, {})[one.run] = one.outcome, one.failure
-    finished = {value: [by[run] for run in takewhile(by.__contains__, count())] for value, by in runs.items()}
+    finished = {
+        value: [by[run] for run in takewhile(by.__contains__, count())]
+        for value, by in runs.items()
+    }
     return Known(
         {value: [outcome for outcome, _ in found] for value, found in finished.items()},
         {value: [how for _, how in found] for value, found in finished.items()},
@@ -223,7 +247,12 @@ def fixes_of(margins: Margins) -> tuple[Fix, ...]:
         if run.run >= FIRST_FIX_RUN:
             fresh.setdefault((run.name, run.value), {})[run.run] = run.outcome == "pass"
     found = []
-    tried = ((one.asked, value) for one in margins_of(margins) for side in one.sides for value in side.tried)
+    tried = (
+        (one.asked, value)
+        for one in margins_of(margins)
+        for side in one.sides
+        for value in side.tried
+    )
     for asked, value in ((asked, one.value) for asked, one in tried if one.verdict == "goal"):
         made = fresh.get((asked.name, value), {})
         reached = sum(made.values())
@@ -231,7 +260,16 @@ def fixes_of(margins: Margins) -> tuple[Fix, ...]:
         # A run that broke counts against it.
         shown = leans_to(reached, runs - reached, REACHED, REACHED / 2.0, ERROR) is True
         share = abs(value - asked.now) / asked.scale
-        found.append(Fix(name=asked.name, value=value, share=share, reached=reached, runs=runs, confirmed=shown if runs >= FIX_RUNS else None))
+        found.append(
+            Fix(
+                name=asked.name,
+                value=value,
+                share=share,
+                reached=reached,
+                runs=runs,
+                confirmed=shown if runs >= FIX_RUNS else None,
+            )
+        )
     return tuple(sorted(found, key=lambda one: (one.share, one.name)))
 
 
@@ -239,20 +277,47 @@ def pairs_of(margins: Margins) -> tuple[NumberAsked, ...]:
     """Two numbers to change together where no change of one was found to lead to the goal: the two with the nearest values at
     which something else happens than f, each towards the end of its range.
     """
-    one_sided = [(one.asked, side, side.gone) for one in margins_of(margins) for side in one.sides if side.gone]
-    gone = [(asked, side, value) for asked, side, value in one_sided if value.verdict == "other" and not asked.together]
+    one_sided = [
+        (one.asked, side, side.gone)
+        for one in margins_of(margins)
+        for side in one.sides
+        if side.gone
+    ]
+    gone = [
+        (asked, side, value)
+        for asked, side, value in one_sided
+        if value.verdict == "other" and not asked.together
+    ]
     gone.sort(key=lambda each: abs(each[2].value - each[0].now) / each[0].scale)
     first = next(iter(gone), None)
     second = next((each for each in gone if first and each[0].name != first[0].name), None)
-    if first is None or second is None or any(fix.confirmed is not False for fix in fixes_of(margins)[:MOST_FIXES]):
+    if (
+        first is None
+        or second is None
+        or any(fix.confirmed is not False for fix in fixes_of(margins)[:MOST_FIXES])
+    ):
         return ()
     parts = tuple((asked.name, asked.now, side.end) for asked, side, _ in (first, second))
-    return (NumberAsked(name=" & ".join(name for name, *_ in parts), now=0.0, low=0.0, high=100.0, scale=100.0, resolution=2.0, unit="%", together=parts),)
+    return (
+        NumberAsked(
+            name=" & ".join(name for name, *_ in parts),
+            now=0.0,
+            low=0.0,
+            high=100.0,
+            scale=100.0,
+            resolution=2.0,
+            unit="%",
+            together=parts,
+        ),
+    )
 
 
 def changes_at(asked: NumberAsked, value: float) -> tuple[tuple[str, float], ...]:
     """The numbers that a value of `asked` means, with their values."""
-    parts = ((name, float(f"{now + value / 100.0 * (end - now):.9g}")) for name, now, end in asked.together)
+    parts = (
+        (name, float(f"{now + value / 100.0 * (end - now):.9g}"))
+        for name, now, end in asked.together
+    )
     return tuple(parts) or ((asked.name, value),)
 
 
@@ -265,9 +330,14 @@ def steps(asked: NumberAsked, up: bool) -> tuple[float, ...]:
         return (asked.high if up else asked.low,)
     # A small number, such as the friction of ice, changes much by a small step.
     usual = FIRST_SHARE * reach
-    first = min(reach, max(asked.resolution, min(usual, asked.now) if asked.low == 0.0 < asked.now else usual))
+    first = min(
+        reach,
+        max(asked.resolution, min(usual, asked.now) if asked.low == 0.0 < asked.now else usual),
+    )
     growth = (reach / first) ** (1.0 / (STEPS - 1))
-    inner = (_at(asked, up, first * growth**step) for step in range(STEPS - 1)) if growth > 1.0 else ()
+    inner = (
+        (_at(asked, up, first * growth**step) for step in range(STEPS - 1)) if growth > 1.0 else ()
+    )
     return (*dict.fromkeys(inner), asked.high if up else asked.low)
 
 
@@ -307,17 +377,25 @@ def next_value(asked: NumberAsked, up: bool, tried: Collection[Value]) -> float 
         high = abs(near[place].value - asked.now)
         low = abs(near[place - 1].value - asked.now) if place else 0.0
         # Far apart, the middle is that of their ratio.
-        middle = _at(asked, up, math.sqrt(low * high) if low > 0.0 and high > 2.0 * low else (low + high) / 2.0)
+        middle = _at(
+            asked,
+            up,
+            math.sqrt(low * high) if low > 0.0 and high > 2.0 * low else (low + high) / 2.0,
+        )
         if high - low > max(asked.resolution, NEAR * high) and middle not in by_value:
             return middle
     goal = next((one.value for one in near if one.verdict == "goal"), None)
     farther = () if goal is None else beyond(asked, up, goal)
-    to_try = (value for value in farther if value not in by_value or by_value[value].verdict != "goal")
+    to_try = (
+        value for value in farther if value not in by_value or by_value[value].verdict != "goal"
+    )
     first = next(to_try, None)
     return None if first in by_value else first
 
 
-def wanted(asked: NumberAsked, rule: Rule, known: Known, most: int = MOST_OF_NUMBER) -> Iterator[tuple[float, int]]:
+def wanted(
+    asked: NumberAsked, rule: Rule, known: Known, most: int = MOST_OF_NUMBER
+) -> Iterator[tuple[float, int]]:
     """The runs that are surely needed next, as (value, run), with at most `most` runs in all; none when the search is over."""
     sides = margin_of(asked, rule, known).sides
     lengths = [len(steps(asked, side.up)) for side in sides]
@@ -331,4 +409,7 @@ def wanted(asked: NumberAsked, rule: Rule, known: Known, most: int = MOST_OF_NUM
         # value is decided, one run after the other says whether more are needed.
         left = most * length // sum(lengths) - sum(len(one.outcomes) for one in side.tried)
         if more <= left:
-            yield from ((value, len(made) + run) for run in range(more if MOST_RUNS - len(made) <= left else 1))
+            yield from (
+                (value, len(made) + run)
+                for run in range(more if MOST_RUNS - len(made) <= left else 1)
+            )

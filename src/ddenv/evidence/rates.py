@@ -30,7 +30,11 @@ def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> In
     rate = successes / trials
     z2 = deviations**2
     centre = (rate + z2 / (2 * trials)) / (1 + z2 / trials)
-    half = deviations / (1 + z2 / trials) * math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials**2))
+    half = (
+        deviations
+        / (1 + z2 / trials)
+        * math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials**2))
+    )
     # Rounding must not push the rate out of its own interval.
     return min(rate, max(0.0, centre - half)), max(rate, min(1.0, centre + half))
 
@@ -43,12 +47,19 @@ def anytime_interval(successes: int, trials: int, error: float = 0.05) -> Interv
     1970).
     """
     misses = trials - successes
-    mixed = math.lgamma(successes + 0.5) + math.lgamma(misses + 0.5) - math.lgamma(trials + 1) - math.log(math.pi)
+    mixed = (
+        math.lgamma(successes + 0.5)
+        + math.lgamma(misses + 0.5)
+        - math.lgamma(trials + 1)
+        - math.log(math.pi)
+    )
 
     def is_likely(rate: float) -> bool:
         if (successes and rate <= 0.0) or (misses and rate >= 1.0):
             return False
-        at_rate = (successes and successes * math.log(rate)) + (misses and misses * math.log(1.0 - rate))
+        at_rate = (successes and successes * math.log(rate)) + (
+            misses and misses * math.log(1.0 - rate)
+        )
         return mixed - at_rate < math.log(1.0 / error)
 
     def edge(outside: float) -> float:

@@ -41,7 +41,9 @@ class Ties:
         for model, other in pairs:
             of[model].add(other)
             on[other].add(model)
-        both = ({model: Environment.of(others) for model, others in each.items()} for each in (of, on))
+        both = (
+            {model: Environment.of(others) for model, others in each.items()} for each in (of, on)
+        )
         return cls(*both)
 
     def breaks(self, there: Environment, keep: Environment) -> bool:
@@ -88,7 +90,9 @@ def fresh_chance(met: Sequence[Environment]) -> float:
 def in_whole_world(state: RunState) -> tuple[Counter[str], int]:
     """In how many of the baseline runs each model took part, empty where that is unknown; and how many runs these are."""
     runs = [test for test in state.tests if test.phase == "baseline" and not test.broke]
-    return Counter(name for test in runs for name in (test.took_part or NOTHING).names(state.elements)), len(runs)
+    return Counter(
+        name for test in runs for name in (test.took_part or NOTHING).names(state.elements)
+    ), len(runs)
 
 
 def in_last(state: RunState) -> Environment | None:

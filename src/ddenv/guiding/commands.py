@@ -23,7 +23,17 @@ from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import made_for, purpose
 from ddenv.schemas import check, split_pair
 from ddenv.settings import SETTINGS, Value
-from ddenv.text import Data, Names, as_sentence, coordinates, count, first_of, printable, shortened, snake_case
+from ddenv.text import (
+    Data,
+    Names,
+    as_sentence,
+    coordinates,
+    count,
+    first_of,
+    printable,
+    shortened,
+    snake_case,
+)
 
 Row = Candidate | Trial
 
@@ -136,7 +146,9 @@ class Step(Asked):
 
     def refusal(self, now: Situation) -> str:
         waits = now.state.waiting_candidate is not None
-        return now.needs_engine() or ("a reduction waits: accept it with a, or reject it with x" if waits else "")
+        return now.needs_engine() or (
+            "a reduction waits: accept it with a, or reject it with x" if waits else ""
+        )
 
     def words(self, _: RunState) -> Words:
         return Words(f"step one {self.unit}")
@@ -149,7 +161,9 @@ class AcceptMode(Asked):
 
     def words(self, _: RunState) -> Words:
         ask = self.mode == "ask"
-        said = "each reduction will wait for you" if ask else "reductions are accepted automatically"
+        said = (
+            "each reduction will wait for you" if ask else "reductions are accepted automatically"
+        )
         return Words(f"accept mode {self.mode}", said)
 
 
@@ -172,7 +186,11 @@ class StartEngine(Asked):
         if state.status == "finished":
             return FINISHED
         spent = state.budget is not None and state.made >= state.budget
-        return f"the budget of {count(state.budget or 0, 'test')} is used up; c raises it" if spent else ""
+        return (
+            f"the budget of {count(state.budget or 0, 'test')} is used up; c raises it"
+            if spent
+            else ""
+        )
 
 
 class Isolate(Asked):
@@ -234,7 +252,11 @@ class GoBack(Asked):
             f"Go on from {there}?\n\nThe run pauses there. Change settings (c), pin (p) or try (w, o); then press space to go on. "
             "Later results stay in the history, and you can come back to them. No test is repeated."
         )
-        return Words("go back", f"back to {there}; the run pauses there, and space begins a new search", question)
+        return Words(
+            "go back",
+            f"back to {there}; the run pauses there, and space begins a new search",
+            question,
+        )
 
 
 class Change(Asked):
@@ -257,13 +279,20 @@ class Change(Asked):
         baseline = now.state.baseline
         failure = new.get("failure")
         # Another epsilon may tell more failures apart.
-        if baseline is not None and isinstance(failure, int) and failure > len(baseline.seen) and "epsilon" not in new:
+        if (
+            baseline is not None
+            and isinstance(failure, int)
+            and failure > len(baseline.seen)
+            and "epsilon" not in new
+        ):
             return f"failure: the whole world showed {count(len(baseline.seen), 'failure')}; choose one of these"
         return "" if new else "these are the settings already"
 
     def words(self, state: RunState) -> Words:
         new = self.new(state).items()
-        words = ", ".join(f"{key} {'no limit' if value is None else printable(str(value))}" for key, value in new)
+        words = ", ".join(
+            f"{key} {'no limit' if value is None else printable(str(value))}" for key, value in new
+        )
         size = None if JUDGES.isdisjoint(self.new(state)) else len(state.elements)
         then = f". {new_search(state, size)}" if self.begins_anew(state) else ""
         return Words("change settings", f"from now on: {words}{then}")
@@ -331,9 +360,18 @@ class OfCandidate(Asked):
     def meant(self, state: RunState) -> Candidate | None:
         """The candidate, while its round goes on."""
         current = state.round
-        if current is None or current.done or current.winner is not None or current.number != self.round:
+        if (
+            current is None
+            or current.done
+            or current.winner is not None
+            or current.number != self.round
+        ):
             return None
-        return current.candidates[self.candidate] if 0 <= self.candidate < len(current.candidates) else None
+        return (
+            current.candidates[self.candidate]
+            if 0 <= self.candidate < len(current.candidates)
+            else None
+        )
 
     def label(self, state: RunState) -> str:
         one = self.meant(state)
@@ -375,7 +413,10 @@ class Veto(OfCandidate):
         return f"{one.label} is {one.verdict} already" if one.verdict else ""
 
     def words(self, state: RunState) -> Words:
-        return Words("veto", f"{self.label(state)} is vetoed: it will not be tried in any round; v again undoes that")
+        return Words(
+            "veto",
+            f"{self.label(state)} is vetoed: it will not be tried in any round; v again undoes that",
+        )
 
 
 class Unveto(OfCandidate):
@@ -385,10 +426,14 @@ class Unveto(OfCandidate):
         one = self.meant(now.state)
         if one is None:
             return round_over(now.state)
-        return "" if one.verdict in REFUSED else f"{one.label} is neither vetoed, rejected nor undone"
+        return (
+            "" if one.verdict in REFUSED else f"{one.label} is neither vetoed, rejected nor undone"
+        )
 
     def words(self, state: RunState) -> Words:
-        return Words("allow it again", f"{self.label(state)} is allowed again and will be tried after all")
+        return Words(
+            "allow it again", f"{self.label(state)} is allowed again and will be tried after all"
+        )
 
 
 def round_over(state: RunState) -> str:
@@ -418,11 +463,15 @@ class Pin(Asked):
         return "" if self.new(now.state) else "pinned already"
 
     def words(self, state: RunState) -> Words:
-        return Words("pin", f"pinned, so that it always stays: {named(self.new(state))}. {new_search(state)}")
+        return Words(
+            "pin", f"pinned, so that it always stays: {named(self.new(state))}. {new_search(state)}"
+        )
 
     def new(self, state: RunState) -> Names:
         """The models that are not pinned yet."""
-        return tuple(name for name in _names_of(state, self.models) or () if name not in state.pinned)
+        return tuple(
+            name for name in _names_of(state, self.models) or () if name not in state.pinned
+        )
 
 
 class Unpin(Asked):
@@ -452,7 +501,9 @@ class Try(Asked):
         if names is None:
             return NO_MODELS
         keep = frozenset(names)
-        loose = next((pair for pair in state.welds if pair[0] in keep and pair[1] not in keep), None)
+        loose = next(
+            (pair for pair in state.welds if pair[0] in keep and pair[1] not in keep), None
+        )
         if loose is not None:
             return f"{named(loose[:1])} is welded to {named(loose[1:])}: they stay or go together"
         if state.baseline is None:
@@ -460,14 +511,22 @@ class Try(Asked):
         if keep == frozenset(state.environment):
             return "that is the current environment: nothing is left out"
         under_way = (trial for trial in state.trials if not trial.verdict)
-        return "that is being tried already" if any(frozenset(each.models) == keep for each in under_way) else ""
+        return (
+            "that is being tried already"
+            if any(frozenset(each.models) == keep for each in under_way)
+            else ""
+        )
 
     def words(self, state: RunState) -> Words:
         names = _names_of(state, self.models) or ()
         keep = frozenset(names)
         without = [name for name in state.environment if name not in keep]
         is_part = keep < frozenset(state.environment)
-        what = f"without {named(without)}" if is_part and len(without) <= len(names) else f"only {named(names)}"
+        what = (
+            f"without {named(without)}"
+            if is_part and len(without) <= len(names)
+            else f"only {named(names)}"
+        )
         what = f"{count(len(names), 'model')}, {what}" if names else "none of the models"
         return Words("try", f"try {len(state.trials) + 1}: {what}")
 
@@ -519,7 +578,11 @@ class LeaveOut(Asked):
         names = _names_of(state, (self.model,)) or ()
         if found is None or not set(names) & set(only_helping(found)):
             return None
-        fresh = (test for test in state.confirm_tests if test.node == found.node and test.run >= found.first_run)
+        fresh = (
+            test
+            for test in state.confirm_tests
+            if test.node == found.node and test.run >= found.first_run
+        )
         return next((test for test in fresh if test.without in names and test.shows_f), None)
 
 
@@ -589,7 +652,9 @@ def _position(pose: tuple[float, ...] | None) -> str:
 
 
 _OfCourse = Pause | Resume | Step | AcceptMode | Stop | Undo | GoBack | Change
-Command = _OfCourse | Accept | Reject | Veto | Unveto | Pin | Unpin | Try | Adopt | LeaveOut | AcceptOther
+Command = (
+    _OfCourse | Accept | Reject | Veto | Unveto | Pin | Unpin | Try | Adopt | LeaveOut | AcceptOther
+)
 KINDS: dict[str, type[Command]] = {snake_case(each.__name__): each for each in get_args(Command)}
 # The run goes on from these: an engine starts for them if none is running.
 GOES_ON = (Try, Adopt, LeaveOut, AcceptOther, Undo, GoBack, Change)
@@ -604,7 +669,9 @@ def refusal(command: Command | StartEngine | Isolate, now: Situation) -> str:
 
 def starts_engine(command: Command, state: RunState) -> bool:
     """Whether an engine starts for a command if none is running. Other pins restart a finished search."""
-    return isinstance(command, GOES_ON) or (isinstance(command, Pin | Unpin) and state.status == "finished")
+    return isinstance(command, GOES_ON) or (
+        isinstance(command, Pin | Unpin) and state.status == "finished"
+    )
 
 
 def drops(command: Command, state: RunState) -> str:
@@ -633,7 +700,11 @@ def question(command: Command, state: RunState) -> str:
         )
     if not lost:
         return own
-    return f"{own}\n\n{lost}" if own else f"{lost}\n\n{command.words(state).brief.capitalize()} anyway?"
+    return (
+        f"{own}\n\n{lost}"
+        if own
+        else f"{lost}\n\n{command.words(state).brief.capitalize()} anyway?"
+    )
 
 
 def said(command: Command, now: Situation) -> str:
@@ -642,7 +713,11 @@ def said(command: Command, now: Situation) -> str:
     if not words or now.engine != "absent":
         return words
     starts = starts_engine(command, now.state)
-    return f"{words}; an engine starts for it" if starts else f"{words}; it waits for an engine, space starts one"
+    return (
+        f"{words}; an engine starts for it"
+        if starts
+        else f"{words}; it waits for an engine, space starts one"
+    )
 
 
 def send(file: RunFile, command: Command) -> int:

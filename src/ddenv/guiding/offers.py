@@ -49,7 +49,11 @@ def offer(action: str, now: c.Situation, pointed: Pointed) -> Offer:
         return Offer()
     why_not = c.refusal(command, now)
     again = isinstance(command, c.StartEngine) and now.state.engines
-    return Offer(why_not=why_not) if why_not else Offer(command, "resume" if again else _FOOTER.get(type(command), ""))
+    return (
+        Offer(why_not=why_not)
+        if why_not
+        else Offer(command, "resume" if again else _FOOTER.get(type(command), ""))
+    )
 
 
 def _pause(now: c.Situation, _: Pointed) -> c.Command | c.StartEngine:
@@ -84,7 +88,11 @@ def _accept(now: c.Situation, pointed: Pointed) -> c.Command:
 
 def nearest_other(state: RunState, row: c.Row) -> Test | None:
     """The test of a candidate or try that ended in another failure, nearest to the end of f."""
-    others = [test for test in state.tests_of(row.tests) if test.outcome == "other" and test.end_pose is not None]
+    others = [
+        test
+        for test in state.tests_of(row.tests)
+        if test.outcome == "other" and test.end_pose is not None
+    ]
     return min(others, key=lambda test: (test.distance is None, test.distance or 0.0), default=None)
 
 
@@ -99,12 +107,16 @@ def _veto(now: c.Situation, pointed: Pointed) -> c.Command:
     state = now.state
     row = pointed.row
     if isinstance(row, Trial):
-        raise UserError(f"{row.label} is your own selection; only candidates of the round can be vetoed")
+        raise UserError(
+            f"{row.label} is your own selection; only candidates of the round can be vetoed"
+        )
     if state.round is None:
         raise UserError("there are no candidates yet")
     if row is None:
         raise UserError(
-            c.round_over(state) if state.round.done else "no candidate is under the cursor: 2 shows the table"
+            c.round_over(state)
+            if state.round.done
+            else "no candidate is under the cursor: 2 shows the table"
         )
     make = c.Unveto if row.verdict in REFUSED else c.Veto
     return make(state.round.number, row.index)
@@ -162,12 +174,16 @@ ACTIONS: dict[str, Meaning] = {
     "resume": lambda now, pointed: c.StartEngine(),
     "step": lambda now, pointed: c.Step("test"),
     "step_round": lambda now, pointed: c.Step("round"),
-    "mode": lambda now, pointed: c.AcceptMode("automatic" if now.state.accept_mode == "ask" else "ask"),
+    "mode": lambda now, pointed: c.AcceptMode(
+        "automatic" if now.state.accept_mode == "ask" else "ask"
+    ),
     "accept": _accept,
     "reject": _reject,
     "veto": _veto,
     "pin": _pin,
-    "without": lambda now, pointed: _try(now, pointed, frozenset(now.state.environment).difference(pointed.models)),
+    "without": lambda now, pointed: _try(
+        now, pointed, frozenset(now.state.environment).difference(pointed.models)
+    ),
     "only": lambda now, pointed: _try(now, pointed, frozenset(pointed.models)),
     "leave_out": _leave_out,
     "undo": lambda now, pointed: c.Undo(),

@@ -59,14 +59,18 @@ class Oracle:
     @cached_property
     def minimal(self) -> tuple[Names, ...]:
         """The 1-minimal sets, the smallest first, each in the order of the models."""
-        found = [kept for kept in self.showing if not any(kept - {name} in self.showing for name in kept)]
+        found = [
+            kept for kept in self.showing if not any(kept - {name} in self.showing for name in kept)
+        ]
         ordered = (tuple(name for name in self.models if name in kept) for kept in found)
         return tuple(sorted(ordered, key=lambda kept: (len(kept), kept)))
 
     def could_go(self, kept: Iterable[str]) -> Names:
         """The models of `kept` that can each be left out alone: f still shows."""
         there = frozenset(kept)
-        return tuple(name for name in self.models if name in there and there - {name} in self.showing)
+        return tuple(
+            name for name in self.models if name in there and there - {name} in self.showing
+        )
 
 
 def read_oracle(path: Path) -> Oracle:
@@ -76,10 +80,15 @@ def read_oracle(path: Path) -> Oracle:
         models = tuple(map(str, data["models"]))
         outcomes = {frozenset(key.split()): str(value) for key, value in data["outcomes"].items()}
         otherwise = str(data["otherwise"])
-        rates = {frozenset(key.split()): float(value) for key, value in data.get("rates", {}).items()}
+        rates = {
+            frozenset(key.split()): float(value) for key, value in data.get("rates", {}).items()
+        }
         rounds = {
             str(name): tuple(
-                RecordedRound(tuple(tuple(part.split()) for part in one["parts"]), tuple(map(str, one["tested"])))
+                RecordedRound(
+                    tuple(tuple(part.split()) for part in one["parts"]),
+                    tuple(map(str, one["tested"])),
+                )
                 for one in each
             )
             for name, each in data.get("plays", {}).items()
@@ -158,7 +167,9 @@ class Attempt:
             raise UserError("no tests are left: press m for the verdict")
         names = tuple(name for name in self.held if name in there)
         outcome = self.oracle.outcome(names)
-        self.tried.append(Tried(names, tuple(name for name in self.held if name not in there), outcome))
+        self.tried.append(
+            Tried(names, tuple(name for name in self.held if name not in there), outcome)
+        )
         if outcome == "similar":
             self._chain.append(names)
         self.moves += (" ".join(("test", *names)),)

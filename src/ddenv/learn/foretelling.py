@@ -67,12 +67,18 @@ def at_hand(moment: Moment) -> Foretold | None:
 
 def _outcome(position: Position, moment: Moment) -> Foretelling | None:
     number = len(moment.after.tests)
-    if not isinstance(moment.recorded.event, TestStarted) or not 0 < number <= len(position.end.tests):
+    if not isinstance(moment.recorded.event, TestStarted) or not 0 < number <= len(
+        position.end.tests
+    ):
         return None
     test = position.end.test(number)
     candidate = pointed(moment)
     later = (position.moment(id) for id in position.ids if id > moment.recorded.id)
-    ended = (each.recorded for each in later if each is not None and isinstance(each.recorded.event, TestFinished))
+    ended = (
+        each.recorded
+        for each in later
+        if each is not None and isinstance(each.recorded.event, TestFinished)
+    )
     until = next((each.id for each in ended if each.data["test"] == number), None)
     if test.outcome not in SAID or candidate is None or until is None:
         return None
@@ -107,7 +113,9 @@ def _hint(candidate: Candidate) -> str:
 
 
 def _round(position: Position, number: int) -> Chapter | None:
-    return next((each for each in position.chapters if (each.kind, each.number) == ("round", number)), None)
+    return next(
+        (each for each in position.chapters if (each.kind, each.number) == ("round", number)), None
+    )
 
 
 def _begun(position: Position, moment: Moment) -> tuple[Chapter, Round] | None:
@@ -133,10 +141,16 @@ def _winner(position: Position, moment: Moment) -> Foretelling | None:
         return None
     answers = [_candidate_answer(one, round) for one in shown]
     none = round.winner is None
-    why = "No candidate showed f." if round.winner is None else f"{_name(round.candidates[round.winner])} showed f."
+    why = (
+        "No candidate showed f."
+        if round.winner is None
+        else f"{_name(round.candidates[round.winner])} showed f."
+    )
     answers.append(Answer("none of them", none, why, "" if none else "stuck"))
     order = (
-        "tested in this order" if shown == listed else f"of which {len(shown)} are listed, in the order of their tests"
+        "tested in this order"
+        if shown == listed
+        else f"of which {len(shown)} are listed, in the order of their tests"
     )
     question = Question(
         f"Round {round.number}: {count(len(listed), 'candidate')}, {order}. Which is the first to show f?",
@@ -148,19 +162,36 @@ def _winner(position: Position, moment: Moment) -> Foretelling | None:
         alone = {one.partition for one in round.candidates if one.kind == "complement"}
         kind = "last" if len(alone) == len(round.partitions) == len(round.environment) else "none"
         return Foretelling(question, chapter.last, _reason(kind, round.number), kind)
-    before = "Those before it probably lack something." if round.winner else "It was the first one to be tried."
-    reason = _reason("won", round.number, candidate=_name(round.candidates[round.winner]), before=before)
+    before = (
+        "Those before it probably lack something."
+        if round.winner
+        else "It was the first one to be tried."
+    )
+    reason = _reason(
+        "won", round.number, candidate=_name(round.candidates[round.winner]), before=before
+    )
     return Foretelling(question, chapter.last, reason, "won")
 
 
 def _candidate_answer(one: Candidate, round: Round) -> Answer:
-    words = f"{one.label}: {_named(one.models)}" if one.size <= FEW else f"{one.label}: {count(one.size, 'model')}"
+    words = (
+        f"{one.label}: {_named(one.models)}"
+        if one.size <= FEW
+        else f"{one.label}: {count(one.size, 'model')}"
+    )
     if round.winner == one.index:
         return Answer(words, True, f"{_name(one)} showed f, so it becomes E.")
     if round.winner is not None and one.index > round.winner:
-        return Answer(words, False, "It was no longer tried: the first candidate that shows f wins.")
+        return Answer(
+            words, False, "It was no longer tried: the first candidate that shows f wins."
+        )
     belief = "alone" if one.kind == "partition" else "part"
-    return Answer(words, False, f"{_name(one)} did not show f: something that f needs is missing in it.", belief)
+    return Answer(
+        words,
+        False,
+        f"{_name(one)} did not show f: something that f needs is missing in it.",
+        belief,
+    )
 
 
 def _name(one: Candidate) -> str:
@@ -184,23 +215,41 @@ def _parts(position: Position, moment: Moment) -> Foretelling | None:
     before = len(round.environment)
     reduced = size < before
     grew = after.n_partitions > round.n_partitions
-    kept = f"{round.candidates[round.winner].label} became E" if round.winner is not None else "E stays as it is"
-    right = f"Right: {kept}, and n {f'grows by {n - round.n_partitions}' if grew else f'stays {n}'}."
+    kept = (
+        f"{round.candidates[round.winner].label} became E"
+        if round.winner is not None
+        else "E stays as it is"
+    )
+    right = (
+        f"Right: {kept}, and n {f'grows by {n - round.n_partitions}' if grew else f'stays {n}'}."
+    )
     options = {
         (max(1, before // 2), n): ("E loses only what f was shown not to need.", ""),
         (size, 2): ("n does not go back to two.", "stuck"),
-        (size, n + 1): (f"n {'grows by one, not by two' if grew else 'stays as it is after this round'}.", ""),
+        (size, n + 1): (
+            f"n {'grows by one, not by two' if grew else 'stays as it is after this round'}.",
+            "",
+        ),
         (before, n): ("E is what showed f, and the rest is gone." if reduced else right, "part"),
         (size, n): (right, ""),
     }
     answers = tuple(
-        Answer(f"{count(models, 'model')} in {count(parts, 'part')}", (models, parts) == (size, n), why, belief)
+        Answer(
+            f"{count(models, 'model')} in {count(parts, 'part')}",
+            (models, parts) == (size, n),
+            why,
+            belief,
+        )
         for (models, parts), (why, belief) in sorted(options.items())
         if parts <= models
     )
     if len(answers) < 2:
         return None
-    asked = "no candidate showed f" if round.winner is None else f"{round.candidates[round.winner].label} showed f"
+    asked = (
+        "no candidate showed f"
+        if round.winner is None
+        else f"{round.candidates[round.winner].label} showed f"
+    )
     question = Question(
         f"Round {round.number} split {count(before, 'model')} into {count(len(round.partitions), 'part')}, and {asked}. "
         "How does the next round split E?",
@@ -221,7 +270,11 @@ def _why_ended(test: Test, candidate: Candidate, options: Settings, missed: int)
     """What the outcome of a candidate's test means, the last one of so many that `missed` f."""
     if test.outcome == "pass" and options.most_runs == 1 and options.accept_rate != "kept":
         return _reason("only pass", test.id)
-    gone = "the models of the part" if candidate.kind == "complement" else "all models outside the part"
+    gone = (
+        "the models of the part"
+        if candidate.kind == "complement"
+        else "all models outside the part"
+    )
     goes = f"f shows without {gone}: they can go."
     if options.accept_rate == "kept":
         goes = f"f can show without {gone}. More runs will tell whether it shows often enough."
@@ -241,7 +294,12 @@ def _reason(name: str, turn: int, most: int | None = None, **words: str) -> Ques
     """
     asked = REASONS[name]
     answers = [
-        Answer(each["say"], each.get("right", False), each["why"].format(**words), each.get("misconception", ""))
+        Answer(
+            each["say"],
+            each.get("right", False),
+            each["why"].format(**words),
+            each.get("misconception", ""),
+        )
         for each in asked["answers"][:most]
     ]
     first = turn % len(answers)

@@ -79,7 +79,9 @@ class Lesson:
 # What students often believe, and what is right instead, by name.
 MISCONCEPTIONS: dict[str, tuple[str, str]] = {
     name: (each["belief"], each["right"])
-    for name, each in yaml.safe_load(Path(__file__).with_name("misconceptions.yaml").read_text()).items()
+    for name, each in yaml.safe_load(
+        Path(__file__).with_name("misconceptions.yaml").read_text()
+    ).items()
 }
 
 

@@ -71,7 +71,9 @@ class Page:
 class Course:
     """At a step of the lesson `opened`, or anywhere in a run without one. The event `at` is shown."""
 
-    def __init__(self, position: Position, opened: Opened | None = None, score: Score | None = None) -> None:
+    def __init__(
+        self, position: Position, opened: Opened | None = None, score: Score | None = None
+    ) -> None:
         self.position = position
         self._opened = opened
         self._steps = () if opened is None else opened.lesson.steps
@@ -107,14 +109,19 @@ class Course:
         asked = self._asked
         if asked is None:
             return Page(text=text, after=after)
-        return Page(text=text, question=asked.question, chosen=asked.chosen, hint=asked.hint, after=after)
+        return Page(
+            text=text, question=asked.question, chosen=asked.chosen, hint=asked.hint, after=after
+        )
 
     def _text(self) -> str:
         if self._opened is None:
             return FREE
         if self.step == self.last:
             # A search is no question: it counts only where it succeeds.
-            alone = sum(bool(step.budget) and str(n) not in self.score.answered for n, step in enumerate(self._steps))
+            alone = sum(
+                bool(step.budget) and str(n) not in self.score.answered
+                for n, step in enumerate(self._steps)
+            )
             return "\n\n".join(summary(self._opened.asked - alone, self.score))
         return self._said(self._opened.lesson.steps[self.step].text)
 
@@ -187,7 +194,11 @@ class Course:
 
     def answer(self, place: int) -> Answer | None:
         """Gives an answer; None if no question is open or it has no such answer."""
-        if self._asked is None or not self.is_open or not 0 <= place < len(self._asked.question.answers):
+        if (
+            self._asked is None
+            or not self.is_open
+            or not 0 <= place < len(self._asked.question.answers)
+        ):
             return None
         answer = self._asked.question.answers[place]
         # A lesson counts its own questions.
@@ -233,10 +244,16 @@ class Course:
         if here.question is not None:
             asked = here.question
             said = self._said
-            answers = tuple(replace(each, text=said(each.text), why=said(each.why)) for each in asked.answers)
-            self._asked = Asked(key=str(step), question=Question(said(asked.text), answers, said(asked.hint)))
+            answers = tuple(
+                replace(each, text=said(each.text), why=said(each.why)) for each in asked.answers
+            )
+            self._asked = Asked(
+                key=str(step), question=Question(said(asked.text), answers, said(asked.hint))
+            )
         elif (found := self._opened.foretold[step]) is not None:
-            self._asked = Asked(key=str(step), question=found.question, until=found.until, then=found.reason)
+            self._asked = Asked(
+                key=str(step), question=found.question, until=found.until, then=found.reason
+            )
         elif here.race:
             self.due = True
             self._asked = Asked(key=str(step), question=bet(self._opened.racers(here)))
@@ -268,7 +285,12 @@ class Course:
         if self._opened is None:
             return ()
         steps = list(enumerate(self._steps))[self.step :]
-        secret = {name for number, step in steps if str(number) not in self.score.answered for name in step.race}
+        secret = {
+            name
+            for number, step in steps
+            if str(number) not in self.score.answered
+            for name in step.race
+        }
         return tuple(play for name, play in self._opened.plays.items() if name not in secret)
 
     def keep(self, attempt: Attempt) -> None:
@@ -312,7 +334,9 @@ class Course:
                 # What was explained a moment ago is not asked again.
                 shown = replace(found, reason=None) if found.kind in self._explained else found
                 self._explained |= {found.kind}
-                self._asked = Asked(key=f"free.{id}", question=shown.question, until=shown.until, then=shown.reason)
+                self._asked = Asked(
+                    key=f"free.{id}", question=shown.question, until=shown.until, then=shown.reason
+                )
                 if self._opened is not None:
                     self._own = self._own or before
                 return True

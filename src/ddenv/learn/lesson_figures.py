@@ -48,11 +48,15 @@ def _fresh_whole(state: RunState) -> str:
     if found is None:
         return "no fresh run"
     tests = [
-        test for test in state.tests if test.phase == CERTIFY and test.run >= found.first_run and test.without is None
+        test
+        for test in state.tests
+        if test.phase == CERTIFY and test.run >= found.first_run and test.without is None
     ]
     whole = [test for test in tests if test.node == 0]
     outcomes = [test.outcome for test in whole if test.outcome in ("similar", "other", "pass")]
-    if not outcomes or {test.run for test in whole} < {test.run for test in tests if test.node == found.node}:
+    if not outcomes or {test.run for test in whole} < {
+        test.run for test in tests if test.node == found.node
+    }:
         return "no fresh run"
     shown = outcomes.count("similar")
     runs = len(outcomes)
@@ -75,12 +79,18 @@ def _bound(state: RunState, without: str | None = None) -> str:
     claim = made.get(without) if made else so_far(state, now).get(without)
     if claim is None:
         raise UserError(f"at this step, no fresh run has yet left '{without}' out")
-    return percent_at_least(claim.bound or 0.0) if without is None else percent_at_most(claim.bound or 0.0)
+    return (
+        percent_at_least(claim.bound or 0.0)
+        if without is None
+        else percent_at_most(claim.bound or 0.0)
+    )
 
 
 def _left(state: RunState) -> str:
     now = _now(state)
-    runs = [test for test in state.confirm_tests if test.run >= now.first_run and test.without is None]
+    runs = [
+        test for test in state.confirm_tests if test.run >= now.first_run and test.without is None
+    ]
     ended = [test.outcome for test in runs if test.node == now.node and test.is_finished]
     return claims.of_runs(ended.count("similar"), len(ended))
 
@@ -97,10 +107,14 @@ def _first_slice(state: RunState) -> Node | None:
 OF_RUN: dict[str, Callable[[RunState], object]] = {
     "models": lambda state: len(state.elements),
     "left": lambda state: len(state.environment),
-    "smaller": lambda state: f"{100 - round(100 * len(state.environment) / max(1, len(state.elements)))} %",
+    "smaller": lambda state: (
+        f"{100 - round(100 * len(state.environment) / max(1, len(state.elements)))} %"
+    ),
     "kept": lambda state: first_of(list(state.environment), _NAMED),
     "tests": lambda state: state.tests_done,
-    "search_tests": lambda state: sum(test.phase == "round" and test.is_finished for test in state.tests),
+    "search_tests": lambda state: sum(
+        test.phase == "round" and test.is_finished for test in state.tests
+    ),
     "fresh_tests": lambda state: sum(test.phase == "certify" for test in state.tests),
     "reruns": lambda state: state.deflake_runs,
     "rounds": lambda state: state.rounds_done,
@@ -114,7 +128,9 @@ OF_RUN: dict[str, Callable[[RunState], object]] = {
     "rate_low": lambda state: _of_baseline(state, "low"),
     "rate_high": lambda state: _of_baseline(state, "high"),
     "miss_chance": lambda state: (
-        "" if state.baseline is None else percent(miss_chance(state.baseline.rate, settings(state).iterations))
+        ""
+        if state.baseline is None
+        else percent(miss_chance(state.baseline.rate, settings(state).iterations))
     ),
     "keep_rate": lambda state: percent(settings(state).keep_rate),
     "needed_share": lambda state: percent(NEEDED_SHARE),
@@ -122,15 +138,23 @@ OF_RUN: dict[str, Callable[[RunState], object]] = {
     "fresh": _fresh,
     "fresh_whole": _fresh_whole,
     "error": lambda state: (
-        f"{math.ceil(1000 * found.error) / 10:g} %" if (found := _certificate(state)) is not None else ""
+        f"{math.ceil(1000 * found.error) / 10:g} %"
+        if (found := _certificate(state)) is not None
+        else ""
     ),
     "reason": lambda state: f"{state.reason[:1].upper()}{state.reason[1:]}",
-    "sliced": lambda state: len(state.elements if (node := _first_slice(state)) is None else node.environment),
+    "sliced": lambda state: len(
+        state.elements if (node := _first_slice(state)) is None else node.environment
+    ),
     "slice": lambda state: (
-        "nothing was removed without testing" if (node := _first_slice(state)) is None else slice_words(state, node)
+        "nothing was removed without testing"
+        if (node := _first_slice(state)) is None
+        else slice_words(state, node)
     ),
     "audit": lambda state: settings(state).audit,
-    "subsets": lambda state: f"{2 ** len(state.elements):,}" if len(state.elements) < 30 else "countless",
+    "subsets": lambda state: (
+        f"{2 ** len(state.elements):,}" if len(state.elements) < 30 else "countless"
+    ),
 }
 # At the place of the step.
 HERE: dict[str, Callable[[RunState], object]] = {
@@ -177,7 +201,9 @@ def check(text: str) -> None:
     for term in TERMS:
         bare = bare.replace(term, "")
     if found := re.search(r"\S*\d\S*", bare):
-        raise UserError(f"'{found[0]}' is a bare figure; write one of the {{names}}, so that it stays true")
+        raise UserError(
+            f"'{found[0]}' is a bare figure; write one of the {{names}}, so that it stays true"
+        )
     if found := re.search(r"[{}]", bare):
         raise UserError(f"a single '{found[0]}'; figures are {{names}} between braces")
 
@@ -220,9 +246,15 @@ class Figures:
             if about[1] == "here_bound without":
                 return _bound(self.here, about[2])
             made = _certificate(end)
-            claim = next((one for one in made.claims if one.without == about[2]), None) if made else None
+            claim = (
+                next((one for one in made.claims if one.without == about[2]), None)
+                if made
+                else None
+            )
             if claim is None:
-                raise UserError(f"{{without {about[2]}}}: the last certificate says nothing about '{about[2]}'")
+                raise UserError(
+                    f"{{without {about[2]}}}: the last certificate says nothing about '{about[2]}'"
+                )
             return claims.rate(claim) if about[1] == "without" else claims.short(claim)
         if self.oracle is None:
             raise UserError(f"{{{name}}} needs an oracle; give the key 'oracle'")
@@ -231,5 +263,9 @@ class Figures:
             return percent(self.oracle.rate(sets[TRUE_RATES.index(bare)]))
         if of_set := _OF_SET.fullmatch(bare):
             rate = self.oracle.rate(of_set[2].split(", "))
-            return percent(rate if of_set[1] == "rate" else 1 - miss_chance(rate, settings(self.end).iterations))
+            return percent(
+                rate
+                if of_set[1] == "rate"
+                else 1 - miss_chance(rate, settings(self.end).iterations)
+            )
         return str(OF_ORACLE[bare](self.oracle))

@@ -76,14 +76,25 @@ def recorded_play(name: str, oracle: Oracle) -> Play:
     environment = oracle.models
     turns = list[Turn]()
     for number, round in enumerate(oracle.rounds[name], 1):
-        if sorted(model for part in round.parts for model in part) != sorted(environment) or not round.tested:
-            raise UserError(f"plays: {name}: round {number}: its parts do not make up the models that were left")
+        if (
+            sorted(model for part in round.parts for model in part) != sorted(environment)
+            or not round.tested
+        ):
+            raise UserError(
+                f"plays: {name}: round {number}: its parts do not make up the models that were left"
+            )
         split = Split(environment=environment, partitions=round.parts)
         kinds = (("partition", 0), ("complement", 1))
-        made = (Candidate(index=2 * at + odd, kind=kind, partition=at, split=split) for at in range(len(split.partitions)) for kind, odd in kinds)
+        made = (
+            Candidate(index=2 * at + odd, kind=kind, partition=at, split=split)
+            for at in range(len(split.partitions))
+            for kind, odd in kinds
+        )
         candidates = {one.label: one for one in made}
         for label in round.tested:
-            if label not in candidates or (turns and turns[-1].round == number and turns[-1].outcome == "similar"):
+            if label not in candidates or (
+                turns and turns[-1].round == number and turns[-1].outcome == "similar"
+            ):
                 raise UserError(f"plays: {name}: round {number}: {label!r} cannot be tested there")
             one = candidates[label]
             outcome = oracle.outcome(one.models)
@@ -106,7 +117,9 @@ def plays_of_runs(runs: Sequence[Path]) -> tuple[Play, ...]:
             found.append(_play_of_run(run, file.events()))
             worlds.append((file.document("world"), set(found[-1].begins)))
         if worlds[-1] != worlds[0]:
-            raise UserError(f"{run}: its world is not that of {runs[0]}; a race needs runs of one world")
+            raise UserError(
+                f"{run}: its world is not that of {runs[0]}; a race needs runs of one world"
+            )
     names = [play.name for play in found]
     if len(set(names)) < len(names):
         raise UserError(f"a race needs different runs, found {', '.join(names)}")
@@ -127,7 +140,15 @@ def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
         elif isinstance(event, TestFinished) and event.test in begun:
             test = state.test(event.test)
             (candidate, again) = begun[event.test]
-            turns.append(Turn(candidate=candidate, round=test.round or 0, outcome=test.outcome, left=state.environment, again=again))
+            turns.append(
+                Turn(
+                    candidate=candidate,
+                    round=test.round or 0,
+                    outcome=test.outcome,
+                    left=state.environment,
+                    again=again,
+                )
+            )
         elif turns and state.environment is not turns[-1].left:
             turns[-1] = replace(turns[-1], left=state.environment)
     if not turns:
@@ -136,8 +157,12 @@ def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
     ended = state.status == "finished" or state.confirming
     chosen = settings(state)
     parts = dict(zip(BOTH, chosen.pair.partition("/")[::2], strict=True))
-    method = f"{chosen.algorithm} {'/'.join(parts[each] for each in uses(chosen.algorithm))}".strip()
-    return Play(name=run.stem, begins=state.elements, turns=tuple(turns), ended=ended, method=method)
+    method = (
+        f"{chosen.algorithm} {'/'.join(parts[each] for each in uses(chosen.algorithm))}".strip()
+    )
+    return Play(
+        name=run.stem, begins=state.elements, turns=tuple(turns), ended=ended, method=method
+    )
 
 
 def spent(play: Play, tests: int | None = None) -> dict[str, int]:
@@ -149,7 +174,11 @@ def reductions(play: Play) -> list[int]:
     """How many models each test that showed f took away."""
     lefts = [len(play.begins), *(len(turn.left) for turn in play.turns)]
     gone = zip(play.turns, pairwise(lefts), strict=True)
-    return [before - after for turn, (before, after) in gone if turn.outcome == "similar" and before > after]
+    return [
+        before - after
+        for turn, (before, after) in gone
+        if turn.outcome == "similar" and before > after
+    ]
 
 
 def kind_of(turn: Turn) -> str:
@@ -209,7 +238,11 @@ def result(plays: Sequence[Play]) -> Sentences:
     """Who won and why, in sentences; a search that did not end cannot win."""
     ended = sorted((play for play in plays if play.ended), key=lambda play: play.tests)
     open_ones = [play.name for play in plays if not play.ended]
-    said = [f"{_and(open_ones)} did not finish, so the number of tests says nothing."] if open_ones else []
+    said = (
+        [f"{_and(open_ones)} did not finish, so the number of tests says nothing."]
+        if open_ones
+        else []
+    )
     if len(ended) < 2:
         return (*said, "So there is no winner.")
     first = ended[0]
@@ -217,7 +250,9 @@ def result(plays: Sequence[Play]) -> Sentences:
     if first.tests == last.tests:
         return (*said, f"All needed {count(first.tests, 'test')}.")
     best = _and([play.name for play in ended if play.tests == first.tests])
-    said.append(f"{best} needed the fewest tests: {first.tests}. {last.name} needed the most: {last.tests}.")
+    said.append(
+        f"{best} needed the fewest tests: {first.tests}. {last.name} needed the most: {last.tests}."
+    )
     return (*said, why(first, last))
 
 
@@ -246,7 +281,8 @@ def bet(plays: Sequence[Play]) -> Question:
     best = [play.name for play in plays if play.tests == fewest]
     tie = len(best) > 1
     answers = [
-        Answer(play.name, best == [play.name], f"{play.name} needs {count(play.tests, 'test')}.") for play in plays
+        Answer(play.name, best == [play.name], f"{play.name} needs {count(play.tests, 'test')}.")
+        for play in plays
     ]
     answers.append(Answer("a tie", tie, f"{_and(best)} {'need' if tie else 'needs'} the fewest."))
     hint = "What does each know about the world before its first test?"
@@ -272,7 +308,11 @@ def comparison(oracle: Oracle, plays: Sequence[Play], attempt: Attempt | None) -
         yield Line("you", len(attempt.tried), attempt.held, not attempt.found)
     for play in plays:
         yield Line(play.name, play.tests, play.left, bool(oracle.could_go(play.left)))
-    size = len(attempt.held) if attempt is not None and attempt.found else min(map(len, oracle.minimal), default=0)
+    size = (
+        len(attempt.held)
+        if attempt is not None and attempt.found
+        else min(map(len, oracle.minimal), default=0)
+    )
     yield Line("minimum", bound(len(oracle.models), size))
 
 
@@ -284,11 +324,15 @@ def bound(models: int, needed: int) -> int:
 def in_one_sentence(oracle: Oracle, plays: Sequence[Play], attempt: Attempt) -> str:
     tests = count(len(attempt.tried), "test")
     held = count(len(attempt.held), "model")
-    done = sorted((play for play in plays if not oracle.could_go(play.left)), key=lambda play: play.tests)
+    done = sorted(
+        (play for play in plays if not oracle.could_go(play.left)), key=lambda play: play.tests
+    )
     others = first_of([f"{play.name} {play.tests}" for play in done], NAMED)
     if not attempt.found:
         behind = f" The algorithms went on until none could: {others}." if others else ""
-        return f"After {tests} you stopped at {held}, and at least one of them can still go.{behind}"
+        return (
+            f"After {tests} you stopped at {held}, and at least one of them can still go.{behind}"
+        )
     found = f"You found {held} in {tests}"
     least = bound(len(oracle.models), len(attempt.held))
     if len(attempt.tried) < least:
@@ -297,5 +341,9 @@ def in_one_sentence(oracle: Oracle, plays: Sequence[Play], attempt: Attempt) -> 
     if not done:
         return f"{found}; without prior knowledge it takes at least {least}."
     quicker = [play.name for play in done if play.tests < len(attempt.tried)]
-    what = f"; {first_of(quicker, NAMED)} needed fewer" if quicker else ", and no algorithm needed fewer"
+    what = (
+        f"; {first_of(quicker, NAMED)} needed fewer"
+        if quicker
+        else ", and no algorithm needed fewer"
+    )
     return f"{found}{what}: {others}."

@@ -107,7 +107,9 @@ class _Node:
             one = _Node(self.file, value, path)
             if name not in known:
                 mine = _Node(self.file, key, path[:80])
-                raise mine.wrong(f"unknown key{nearest(name, known)}; allowed are {', '.join(known)}")
+                raise mine.wrong(
+                    f"unknown key{nearest(name, known)}; allowed are {', '.join(known)}"
+                )
             if name in found:
                 raise _Node(self.file, key, path).wrong("appears twice")
             found[name] = one
@@ -119,7 +121,10 @@ class _Node:
     def entries(self) -> list[_Node]:
         if not isinstance(self.node, yaml.SequenceNode) or not self.node.value:
             raise self.wrong("expected a list with at least one entry")
-        return [_Node(self.file, each, f"{self.key}[{place}]") for place, each in enumerate(self.node.value, 1)]
+        return [
+            _Node(self.file, each, f"{self.key}[{place}]")
+            for place, each in enumerate(self.node.value, 1)
+        ]
 
     def raw(self) -> str:
         if not isinstance(self.node, yaml.ScalarNode) or not self.node.value.strip():
@@ -140,7 +145,9 @@ class _Node:
     def one_of(self, known: tuple[str, ...]) -> str:
         text = self.raw()
         if text not in known:
-            raise self.wrong(f"{text[:40]!r} is not allowed{nearest(text, known)}; use one of {', '.join(known)}")
+            raise self.wrong(
+                f"{text[:40]!r} is not allowed{nearest(text, known)}; use one of {', '.join(known)}"
+            )
         return text
 
 
@@ -148,7 +155,9 @@ def _beside(node: _Node) -> Path:
     """A file in the lesson's own folder."""
     name = node.raw()
     if Path(name).name != name or name in (".", ".."):
-        raise node.wrong(f"{name[:60]!r} is not in the lesson's folder; give the name of a file beside the lesson")
+        raise node.wrong(
+            f"{name[:60]!r} is not in the lesson's folder; give the name of a file beside the lesson"
+        )
     path = node.file.parent / name
     if not path.is_file():
         raise node.wrong(f"there is no file {name[:60]!r} beside the lesson")
@@ -158,17 +167,24 @@ def _beside(node: _Node) -> Path:
 def _others(node: _Node) -> dict[str, Path]:
     if not isinstance(node.node, yaml.MappingNode):
         raise node.wrong("expected names, each with a file")
-    return {str(key.value): _beside(_Node(node.file, value, f"beside.{key.value}")) for key, value in node.node.value}
+    return {
+        str(key.value): _beside(_Node(node.file, value, f"beside.{key.value}"))
+        for key, value in node.node.value
+    }
 
 
 def _step(node: _Node, find: Find, has_oracle: bool) -> Step:
     keys = node.keys(_STEP, "text")
     at = keys.get("at")
     if len(does := [key for key in _DOES if key in keys]) > 1:
-        raise keys[does[1]].wrong(f"a step has one of {', '.join(_DOES)}, found {' and '.join(does)}")
+        raise keys[does[1]].wrong(
+            f"a step has one of {', '.join(_DOES)}, found {' and '.join(does)}"
+        )
     for key in ("try", "race"):
         if key in keys and not has_oracle:
-            raise keys[key].wrong("needs the outcome of every part of the world; give the lesson the key 'oracle'")
+            raise keys[key].wrong(
+                "needs the outcome of every part of the world; give the lesson the key 'oracle'"
+            )
     for key in ("answers", "hint"):
         if key in keys and "ask" not in keys:
             raise keys[key].wrong("belongs to a question; the key 'ask' is missing")
@@ -194,7 +210,9 @@ def _step(node: _Node, find: Find, has_oracle: bool) -> Step:
 def _racers(node: _Node) -> tuple[str, ...]:
     entries = node.entries()
     if not RACERS[0] <= len(entries) <= RACERS[1]:
-        raise node.wrong(f"expected {RACERS[0]} to {RACERS[1]} algorithms or pairs, found {len(entries)}")
+        raise node.wrong(
+            f"expected {RACERS[0]} to {RACERS[1]} algorithms or pairs, found {len(entries)}"
+        )
     found: list[str] = []
     for each in entries:
         found.append(each.one_of((*names("algorithm"), *pairs())))
@@ -208,7 +226,9 @@ def _question(node: _Node, keys: dict[str, _Node]) -> Question:
         raise node.wrong("the key 'answers' is missing")
     answers = tuple(map(_answer, keys["answers"].entries()))
     if not ANSWERS[0] <= len(answers) <= ANSWERS[1]:
-        raise keys["answers"].wrong(f"expected {ANSWERS[0]} to {ANSWERS[1]} answers, found {len(answers)}")
+        raise keys["answers"].wrong(
+            f"expected {ANSWERS[0]} to {ANSWERS[1]} answers, found {len(answers)}"
+        )
     if (right := sum(answer.right for answer in answers)) != 1:
         raise keys["answers"].wrong(f"expected exactly one answer that is right, found {right}")
     return Question(keys["ask"].words(), answers, keys["hint"].words() if "hint" in keys else "")
@@ -275,5 +295,7 @@ class Places:
         key = (found[1], 0) if found[1] else (found[2], int(found[3]))
         if key not in self._found:
             most = self._most(key[0])
-            raise UserError(f"the run has no {words.strip()}{f'; the last one is {key[0]} {most}' if most else ''}")
+            raise UserError(
+                f"the run has no {words.strip()}{f'; the last one is {key[0]} {most}' if most else ''}"
+            )
         return self._found[key]

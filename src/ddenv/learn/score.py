@@ -29,7 +29,9 @@ class Score:
     streak: int = 0
     best: int = 0
     misconceptions: Mapping[str, int] = field(default_factory=dict)
-    moves: Mapping[str, Annotated[Names, Field(max_length=MOST_MOVES)]] = field(default_factory=dict)
+    moves: Mapping[str, Annotated[Names, Field(max_length=MOST_MOVES)]] = field(
+        default_factory=dict
+    )
 
     @property
     def right(self) -> int:
@@ -40,9 +42,18 @@ class Score:
         if key in self.answered:
             return self
         streak = self.streak + 1 if answer.right else 0
-        beliefs = dict(Counter(self.misconceptions) + Counter([answer.misconception] if answer.misconception else ()))
+        beliefs = dict(
+            Counter(self.misconceptions)
+            + Counter([answer.misconception] if answer.misconception else ())
+        )
         answered = {**self.answered, key: answer.right}
-        return replace(self, answered=answered, streak=streak, best=max(self.best, streak), misconceptions=beliefs)
+        return replace(
+            self,
+            answered=answered,
+            streak=streak,
+            best=max(self.best, streak),
+            misconceptions=beliefs,
+        )
 
     def at(self, step: int, last: int) -> Score:
         """At a step of a lesson whose last step is `last`."""
@@ -64,7 +75,11 @@ def summary(asked: int, score: Score) -> list[str]:
     """The end of a lesson with so many questions `asked`, in sentences."""
     skipped = max(0, asked - len(score.answered))
     more = f"; {skipped} skipped" if skipped else ""
-    right = f"{score.right} of {len(score.answered)} questions right" if score.answered else "no question"
+    right = (
+        f"{score.right} of {len(score.answered)} questions right"
+        if score.answered
+        else "no question"
+    )
     lines = [f"You answered {right}{more}."]
     if score.best > 1:
         lines.append(f"Your longest streak: {score.best} right answers in a row.")

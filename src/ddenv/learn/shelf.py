@@ -52,7 +52,11 @@ class Opened:
 
     def attempt(self, step: Step, moves: Iterable[str] = ()) -> Attempt | None:
         """The student's own search in a step, after these moves; None if the step has none."""
-        return None if step.budget is None or self.oracle is None else Attempt(self.oracle, step.budget, moves)
+        return (
+            None
+            if step.budget is None or self.oracle is None
+            else Attempt(self.oracle, step.budget, moves)
+        )
 
     def racers(self, step: Step) -> tuple[Play, ...]:
         return tuple(self.plays[name] for name in step.race)
@@ -60,7 +64,9 @@ class Opened:
     def text(self, words: str, at: int) -> str:
         """`words` with their figures, as they are at the event `at`. Raises UserError for one that nothing here knows."""
         here = self.position.state(at)
-        return lesson_figures.filled(words, Figures(self.position.end, here, self.oracle, self.beside))
+        return lesson_figures.filled(
+            words, Figures(self.position.end, here, self.oracle, self.beside)
+        )
 
     @cached_property
     def foretold(self) -> tuple[Foretelling | None, ...]:
@@ -69,7 +75,9 @@ class Opened:
         kinds = {""}
         for step, at in zip(self.lesson.steps, self.places, strict=True):
             each = None if step.foretell is None else foretelling(self.position, at, step.foretell)
-            found.append(replace(each, reason=None) if each is not None and each.kind in kinds else each)
+            found.append(
+                replace(each, reason=None) if each is not None and each.kind in kinds else each
+            )
             kinds |= {"" if each is None else each.kind}
         return tuple(found)
 
@@ -111,7 +119,9 @@ def open_lesson(file: Path) -> Opened:
         raise UserError(f"{lesson.oracle}: its models are not those of {lesson.run.name}")
     searches = any(step.budget for step in lesson.steps)
     if oracle is not None and searches and frozenset(oracle.models) not in oracle.showing:
-        raise UserError(f"{lesson.oracle}: f does not show with all models, so there is nothing to search")
+        raise UserError(
+            f"{lesson.oracle}: f does not show with all models, so there is nothing to search"
+        )
     plays = {} if oracle is None else _plays(lesson, oracle)
     beside = {}
     for name, run in lesson.beside.items():
@@ -142,11 +152,17 @@ def _check(opened: Opened) -> None:
     for step, at, found in zip(opened.lesson.steps, opened.places, opened.foretold, strict=True):
         texts = [step.text]
         if (asked := step.question) is not None:
-            texts += [asked.text, asked.hint, *(f"{each.text} {each.why}" for each in asked.answers)]
+            texts += [
+                asked.text,
+                asked.hint,
+                *(f"{each.text} {each.why}" for each in asked.answers),
+            ]
         try:
             opened.text(" ".join(texts), at)
             if step.foretell is not None and found is None:
-                raise UserError("foretell: nothing of this kind can be foretold there; choose another place in the run")
+                raise UserError(
+                    "foretell: nothing of this kind can be foretold there; choose another place in the run"
+                )
         except UserError as error:
             raise UserError(f"{opened.lesson.file}:{step.line}: {error}") from None
 
@@ -164,10 +180,17 @@ def write_template(file: Path, run: Path) -> tuple[Path, Path]:
         raise UserError(f"{file}: a lesson's name must end in .yaml")
     with RunFile(run) as content:
         state = position_in(content.events()).end
-    first = next((test for test in state.tests if test.phase == "round" and test.implied_by is None), None)
+    first = next(
+        (test for test in state.tests if test.phase == "round" and test.implied_by is None), None
+    )
     if first is None or not state.rounds_done:
         raise UserError(f"{run}: has no finished round yet, so there is nothing to predict")
-    words = {"file": file.name, "run": run.name, "test": f"test {first.id}", "round": f"round {first.round}"}
+    words = {
+        "file": file.name,
+        "run": run.name,
+        "test": f"test {first.id}",
+        "round": f"round {first.round}",
+    }
     write_file(copy, read_bytes(run))
     write_file(file, Template(TEMPLATE.read_text()).substitute(words).encode())
     return file, copy

@@ -12,7 +12,9 @@ from ddenv.runfile.tested import pointed
 from ddenv.text import count
 
 SIGNS = {"similar": "●", "other": "◇", "pass": "○", "error": "✗", "timeout": "◷", "running": "▶"}
-VERDICTS = {"similar": "●", "dissimilar": "○", "missed": "○", "unknown": "✗"} | dict.fromkeys(REFUSED, "⊘")
+VERDICTS = {"similar": "●", "dissimilar": "○", "missed": "○", "unknown": "✗"} | dict.fromkeys(
+    REFUSED, "⊘"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +33,12 @@ def variables(moment: Moment) -> tuple[Variable, ...]:
     now = _values(moment.after, candidate)
     earlier = None
     # The candidate as it was before, if it is one of the same round.
-    if candidate and round and round.split is candidate.split and candidate.index < len(round.candidates):
+    if (
+        candidate
+        and round
+        and round.split is candidate.split
+        and candidate.index < len(round.candidates)
+    ):
         earlier = round.candidates[candidate.index]
     before = _values(moment.before, earlier)
     return tuple(Variable(name, value, value != before[name]) for name, value in now.items())
@@ -44,10 +51,16 @@ def _values(state: RunState, candidate: Candidate | None) -> dict[str, str]:
     # All candidates in short, with their verdicts; the current one between brackets. `-A` is all without A.
     for one in () if round is None else round.candidates:
         letter = one.label.rpartition(" ")[2]
-        words = f"{letter if one.kind == 'partition' else f'-{letter}'}{VERDICTS.get(one.verdict, '')}"
-        said.append(f"[{words}]" if candidate is not None and one.index == candidate.index else words)
+        words = (
+            f"{letter if one.kind == 'partition' else f'-{letter}'}{VERDICTS.get(one.verdict, '')}"
+        )
+        said.append(
+            f"[{words}]" if candidate is not None and one.index == candidate.index else words
+        )
     return {
-        "E": f"{count(len(state.environment), 'model')}: {_names(state.environment)}" if state.nodes else "",
+        "E": f"{count(len(state.environment), 'model')}: {_names(state.environment)}"
+        if state.nodes
+        else "",
         "n_partitions": "" if round is None else str(round.n_partitions),
         "subenvironments": " ".join(said),
         "s": "" if candidate is None else f"{candidate.label} = {_names(candidate.models)}",

@@ -47,7 +47,9 @@ class Signs:
     sure: np.ndarray
 
 
-def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Collection[Cell] = ()) -> dict[int, Cell]:
+def place_signs(
+    grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Collection[Cell] = ()
+) -> dict[int, Cell]:
     """The cell where the sign of each model begins, for as many models as stay readable; no two signs overlap.
 
     `grid` (2 rows, columns) holds the owners of pixels, `centers` (N, 2) are in pixels; `taken` cells stay free.
@@ -77,7 +79,11 @@ def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Coll
         placed[index] = row, column
         return True
 
-    missing = [index for index, cell in zip(seen.tolist(), cells[seen].tolist(), strict=True) if not put(index, *cell)]
+    missing = [
+        index
+        for index, cell in zip(seen.tolist(), cells[seen].tolist(), strict=True)
+        if not put(index, *cell)
+    ]
     groups = {int(signs.groups[index]) for index in placed}
     for index in missing:
         group = int(signs.groups[index])
@@ -105,7 +111,9 @@ def signs(models: Sequence[Drawn]) -> list[str]:
     return found
 
 
-def picture(models: Sequence[Drawn], view: View, *, color: bool, dim: Collection[str] = ()) -> Canvas:
+def picture(
+    models: Sequence[Drawn], view: View, *, color: bool, dim: Collection[str] = ()
+) -> Canvas:
     """All models in `view`, each with its sign; those that are `dim` have none. `PLAIN` is the terminal's own colour."""
     canvas = Canvas(view.rows, view.columns, GREY)
     canvas.fore[:] = PLAIN
@@ -120,9 +128,13 @@ def picture(models: Sequence[Drawn], view: View, *, color: bool, dim: Collection
     else:
         _letters(canvas, grid, models, letters, faint)
     centers = view.pixels(np.array([each.outline.center for each in models]).reshape(-1, 2))
-    for (row, column), sign, fill in zip(label_cells(grid, centers).tolist(), letters, fills, strict=True):
+    for (row, column), sign, fill in zip(
+        label_cells(grid, centers).tolist(), letters, fills, strict=True
+    ):
         if row >= 0 and sign:
-            canvas.put((row, column), sign, readable(fill) if color else PLAIN, fill if color else None)
+            canvas.put(
+                (row, column), sign, readable(fill) if color else PLAIN, fill if color else None
+            )
     return canvas
 
 
@@ -161,10 +173,17 @@ def _blocks(canvas: Canvas, grid: np.ndarray, fills: Sequence[int]) -> None:
 
 
 def _letters(
-    canvas: Canvas, grid: np.ndarray, models: Sequence[Drawn], letters: Sequence[str], faint: Sequence[bool]
+    canvas: Canvas,
+    grid: np.ndarray,
+    models: Sequence[Drawn],
+    letters: Sequence[str],
+    faint: Sequence[bool],
 ) -> None:
     """Every cell shows its model; of two models in one cell the one drawn later."""
-    plain = (FLOORS[index % 2] if each.floor else letters[index] or NO_SIGN for index, each in enumerate(models))
+    plain = (
+        FLOORS[index % 2] if each.floor else letters[index] or NO_SIGN
+        for index, each in enumerate(models)
+    )
     own = [FAINT_SIGN if is_faint else char for char, is_faint in zip(plain, faint, strict=True)]
     chars = np.array([ord(char) for char in [*own, " "]], dtype=np.uint32)
     canvas.chars[:] = chars[np.maximum(grid[0::2], grid[1::2])]

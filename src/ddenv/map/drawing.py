@@ -32,7 +32,9 @@ GAP = 3.0
 LONGEST_LABEL = 26  # columns
 MARK = 14.0  # half the size of a mark, with some space, pixels
 MOST_COVERED = 0.3  # maximum fraction of a name that may cover other models
-LARGE = 10.0  # a model at least this many times larger than a name may carry the name of another model
+LARGE = (
+    10.0  # a model at least this many times larger than a name may carry the name of another model
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +99,9 @@ def tick_step(span: float, most: int) -> float:
     if not (math.isfinite(least) and least > 0):
         return 1.0
     power = 10.0 ** math.floor(math.log10(least))
-    return next(power * factor for factor in (1, 2, 5, 10, 20) if power * factor >= least * (1 - 1e-9))
+    return next(
+        power * factor for factor in (1, 2, 5, 10, 20) if power * factor >= least * (1 - 1e-9)
+    )
 
 
 def ticks(low: float, high: float, step: float) -> list[float]:
@@ -114,7 +118,9 @@ def tick_text(value: float, step: float) -> str:
     return f"{value:.{decimals}f}"
 
 
-def plot(frame: Frame, most: int, name: str, inside: Iterable[str], above: Iterable[str]) -> Iterator[str]:
+def plot(
+    frame: Frame, most: int, name: str, inside: Iterable[str], above: Iterable[str]
+) -> Iterator[str]:
     """A map in its axes: what is `inside` is cut off at its frame, names and marks `above` it are not.
 
     An axis has at most `most` numbers; `name` is different for each map of a page.
@@ -132,7 +138,9 @@ def plot(frame: Frame, most: int, name: str, inside: Iterable[str], above: Itera
     yield tick(right, bottom + 34, "end", "x, m")
     turned = f"translate(13 {(top + bottom) / 2:.1f}) rotate(-90)"
     yield f'<text class="tick" transform="{turned}" text-anchor="middle">y, m</text>'
-    rectangle = f'x="{left:.1f}" y="{top:.1f}" width="{right - left:.1f}" height="{bottom - top:.1f}"'
+    rectangle = (
+        f'x="{left:.1f}" y="{top:.1f}" width="{right - left:.1f}" height="{bottom - top:.1f}"'
+    )
     yield f'<clipPath id="{name}"><rect {rectangle}/></clipPath>'
     yield from (f'<g clip-path="url(#{name})">', *inside, "</g>", *above)
     yield f'<rect class="frame" {rectangle}/>'
@@ -175,7 +183,12 @@ def written(text: str) -> str:
 
 
 def labels(
-    models: Sequence[Drawn], wanted: Iterable[int], most: int, frame: Frame, points: Sequence[Point], size: float = SIZE
+    models: Sequence[Drawn],
+    wanted: Iterable[int],
+    most: int,
+    frame: Frame,
+    points: Sequence[Point],
+    size: float = SIZE,
 ) -> Iterator[str]:
     """The names of the `most` largest of the `wanted` models that have room for one; none covers the marks at `points`, m."""
     largest = sorted(wanted, key=lambda index: -models[index].outline.area)[:most]
@@ -189,7 +202,9 @@ def labels(
         box[:2] = np.clip(corners.min(axis=0) - around, (left, top), (right, bottom))
         box[2:] = np.clip(corners.max(axis=0) + around, (left, top), (right, bottom))
     floors = np.array([each.floor for each in models], dtype=bool)
-    marks = [np.array([x - MARK, y - MARK, x + MARK, y + MARK]) for x, y in map(frame.pixel, points)]
+    marks = [
+        np.array([x - MARK, y - MARK, x + MARK, y + MARK]) for x, y in map(frame.pixel, points)
+    ]
     for index, box in place_labels(names, boxes, floors, frame.box, marks, size).items():
         long, high = box[2:] - box[:2]
         # On its own background, so that outlines and neighbours do not make it hard to read.
@@ -237,14 +252,23 @@ def _places(box: np.ndarray, long: float, high: float, floor: bool) -> Iterator[
     left, top, right, bottom = box.tolist()
     x = (left + right) / 2
     y = (top + bottom) / 2
-    middles = [(right + long / 2, y), (left - long / 2, y), (x, top - high / 2), (x, bottom + high / 2)]
+    middles = [
+        (right + long / 2, y),
+        (left - long / 2, y),
+        (x, top - high / 2),
+        (x, bottom + high / 2),
+    ]
     if long <= right - left and high <= bottom - top:
         corners = [
-            (side, end) for end in (top + high / 2, bottom - high / 2) for side in (left + long / 2, right - long / 2)
+            (side, end)
+            for end in (top + high / 2, bottom - high / 2)
+            for side in (left + long / 2, right - long / 2)
         ]
         middles = [*(corners if floor else ()), (x, y), *middles]
     for middle_x, middle_y in middles:
-        yield np.array([middle_x - long / 2, middle_y - high / 2, middle_x + long / 2, middle_y + high / 2])
+        yield np.array(
+            [middle_x - long / 2, middle_y - high / 2, middle_x + long / 2, middle_y + high / 2]
+        )
 
 
 def _shared(box: np.ndarray, others: np.ndarray) -> np.ndarray:

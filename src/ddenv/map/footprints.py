@@ -8,7 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.map.colors import RGB
-from ddenv.world.extent import circle, convex_hull, filled_bounds, model_bounds, polygon_area, shape_bounds, vertices_of
+from ddenv.world.extent import (
+    circle,
+    convex_hull,
+    filled_bounds,
+    model_bounds,
+    polygon_area,
+    shape_bounds,
+    vertices_of,
+)
 from ddenv.world.model import Box, Ground, Model, Plane, World, is_ground
 from ddenv.world.pose import HERE, Point, Pose, Vector, vector
 
@@ -72,20 +80,27 @@ def footprints(world: World) -> tuple[Footprint, ...]:
 def ground_height(world: World) -> float:
     """The height of the highest plane or large box, m; infinite without any: a mesh may be hills."""
     flat = [
-        filled_bounds(one) for model in world.models for one in model.collisions if isinstance(one.shape, Plane | Box)
+        filled_bounds(one)
+        for model in world.models
+        for one in model.collisions
+        if isinstance(one.shape, Plane | Box)
     ]
     tops = [float(high[2]) for low, high in flat if np.prod((high - low)[:2]) > FLOOR_AREA]
     return max(tops, default=math.inf)
 
 
-def footprint(model: Model, corners: int = ROUND, moved: Pose = HERE, ground: float = math.inf) -> Footprint:
+def footprint(
+    model: Model, corners: int = ROUND, moved: Pose = HERE, ground: float = math.inf
+) -> Footprint:
     """The footprint of `model`; a point without collision shapes. Circles become polygons with `corners` corners.
 
     Pieces that begin more than `HEAD` above the `ground` (m), or else above its lowest point, are left out: the wall above a door.
     `moved` is how the model has moved as a whole since the world's file, in the world frame.
     """
     polygons = []
-    pieces = [(each, shape_bounds(each.shape, moved @ each.pose)[0][2]) for each in model.collisions]
+    pieces = [
+        (each, shape_bounds(each.shape, moved @ each.pose)[0][2]) for each in model.collisions
+    ]
     if math.isinf(ground):
         ground = min((foot for _, foot in pieces), default=0.0)
     for each, foot in pieces:
@@ -98,7 +113,12 @@ def footprint(model: Model, corners: int = ROUND, moved: Pose = HERE, ground: fl
     points = np.vstack(polygons) if polygons else np.array([(moved @ model.pose).position[:2]])
     low = points.min(axis=0)
     high = points.max(axis=0)
-    return Footprint(model.name, tuple(polygons), (float(low[0]), float(low[1])), (float(high[0]), float(high[1])))
+    return Footprint(
+        model.name,
+        tuple(polygons),
+        (float(low[0]), float(low[1])),
+        (float(high[0]), float(high[1])),
+    )
 
 
 def rings(model: Model, moved: Pose) -> tuple[np.ndarray, ...]:
@@ -144,7 +164,11 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
     ground = ground_height(world)
     models = [model for model in world.models if not is_ground(model)]
     outlines = [footprint(model, corners, ground=ground) for model in models]
-    limit = max(FLOOR_AREA, FLOOR_FACTOR * float(np.median([each.area for each in outlines]))) if models else 0.0
+    limit = (
+        max(FLOOR_AREA, FLOOR_FACTOR * float(np.median([each.area for each in outlines])))
+        if models
+        else 0.0
+    )
     drawn = []
     for model, outline in zip(models, outlines, strict=True):
         center = model.pose.position
@@ -153,7 +177,16 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
             center = vector((box[0] + box[1]) / 2)
             size = vector(box[1] - box[0])
         floor = len(models) > 2 and outline.area > limit and not outline.hollow
-        drawn.append(Drawn(model=model, outline=outline, center=center, size=size, color=_color(model), floor=floor))
+        drawn.append(
+            Drawn(
+                model=model,
+                outline=outline,
+                center=center,
+                size=size,
+                color=_color(model),
+                floor=floor,
+            )
+        )
     return tuple(sorted(drawn, key=_turn))
 
 

@@ -39,7 +39,13 @@ class Canvas:
     def copy(self) -> Canvas:
         return deepcopy(self)
 
-    def put(self, cell: tuple[int, int] | None, text: str, color: int | None = None, back: int | None = None) -> None:
+    def put(
+        self,
+        cell: tuple[int, int] | None,
+        text: str,
+        color: int | None = None,
+        back: int | None = None,
+    ) -> None:
         """Puts bold `text` from a cell (row, column) on; without `color` in a readable one."""
         if cell is None:
             return

@@ -47,7 +47,9 @@ class View:
         """Points (N, 2) m to (N, 2) pixels: column and half row, as fractions."""
         left = self.x - self.columns * self.scale / 2
         top = self.y + self.rows * self.scale
-        return np.column_stack([(points[:, 0] - left) / self.scale, (top - points[:, 1]) / self.scale])
+        return np.column_stack(
+            [(points[:, 0] - left) / self.scale, (top - points[:, 1]) / self.scale]
+        )
 
     def cell(self, x: float, y: float) -> tuple[int, int] | None:
         """Row and column of the cell at (x, y) m; None outside the map."""
@@ -69,7 +71,13 @@ class View:
         scale = min(COARSEST, max(FINEST, self.scale / factor))
         x, y = about or (self.x, self.y)
         part = scale / self.scale
-        return View(x=x + (self.x - x) * part, y=y + (self.y - y) * part, scale=scale, columns=self.columns, rows=self.rows)
+        return View(
+            x=x + (self.x - x) * part,
+            y=y + (self.y - y) * part,
+            scale=scale,
+            columns=self.columns,
+            rows=self.rows,
+        )
 
     def around(self, x: float, y: float) -> View:
         """The view at the same scale, centred on (x, y) m."""
@@ -92,7 +100,13 @@ def fit(
     low = low - margin
     high = high + margin
     scale = max((high[0] - low[0]) / max(1, columns), (high[1] - low[1]) / max(1, 2 * rows), FINEST)
-    return View(x=float(low[0] + high[0]) / 2, y=float(low[1] + high[1]) / 2, scale=float(scale), columns=columns, rows=rows)
+    return View(
+        x=float(low[0] + high[0]) / 2,
+        y=float(low[1] + high[1]) / 2,
+        scale=float(scale),
+        columns=columns,
+        rows=rows,
+    )
 
 
 def extent(prints: Sequence[Footprint], points: Iterable[Point]) -> tuple[np.ndarray, np.ndarray]:
@@ -102,7 +116,9 @@ def extent(prints: Sequence[Footprint], points: Iterable[Point]) -> tuple[np.nda
     smallest model is shown whole, however short the way between the points is: it may be a building.
     """
     corners = np.array([point for point in points if len(point)], dtype=float).reshape(-1, 2)
-    boxes = np.array([(*each.low, *each.high, each.area) for each in prints], dtype=float).reshape(-1, 5)
+    boxes = np.array([(*each.low, *each.high, each.area) for each in prints], dtype=float).reshape(
+        -1, 5
+    )
     # Sorted by size: each model and those before it decide whether the next is huge.
     boxes = boxes[np.argsort(boxes[:, 4], kind="stable")]
     least = corners.min(axis=0, initial=math.inf)
@@ -153,7 +169,12 @@ class Spans:
 
 def pack(prints: Sequence[Footprint]) -> Outlines:
     """Footprints as arrays, for repeated drawing."""
-    polygons = [(index, polygon) for index, each in enumerate(prints) for polygon in each.polygons if len(polygon)]
+    polygons = [
+        (index, polygon)
+        for index, each in enumerate(prints)
+        for polygon in each.polygons
+        if len(polygon)
+    ]
     counts = np.array([len(polygon) for _, polygon in polygons], dtype=np.intp)
     corners = np.concatenate([polygon for _, polygon in polygons]) if polygons else np.zeros((0, 2))
     first = np.cumsum(counts) - counts
@@ -164,7 +185,9 @@ def pack(prints: Sequence[Footprint]) -> Outlines:
         high = np.maximum.reduceat(corners, first)
         here = corners - np.repeat(low, counts, axis=0)
         ahead = here[following]
-        areas = np.abs(np.add.reduceat(here[:, 0] * ahead[:, 1] - here[:, 1] * ahead[:, 0], first)) / 2
+        areas = (
+            np.abs(np.add.reduceat(here[:, 0] * ahead[:, 1] - here[:, 1] * ahead[:, 0], first)) / 2
+        )
         lengths = np.hypot(*(high - low).T)
     return Outlines(
         corners=corners,
@@ -246,7 +269,9 @@ def rows_of(outlines: Outlines, view: View) -> tuple[np.ndarray, ...]:
     return polygon[filled], row[filled], left[filled].astype(np.intp), right[filled].astype(np.intp)
 
 
-def owners(filled: Spans, view: View, drawn: Sequence[int] | np.ndarray | None = None) -> np.ndarray:
+def owners(
+    filled: Spans, view: View, drawn: Sequence[int] | np.ndarray | None = None
+) -> np.ndarray:
     """The model on each pixel, shape (2 rows, columns): the last of the `drawn` ones (default all) that fill it, else EMPTY."""
     grid = np.full(2 * view.rows * view.columns, EMPTY, dtype=np.int32)
     models = filled.models

@@ -52,7 +52,9 @@ def svg_map(world: World, *, spawn: Vector | None = None, goal: Point | None = N
     models = plan(world, CORNERS)
     points = [point[:2] for point in (spawn, goal) if point is not None]
     # A long and narrow world gets a frame that has room for its title.
-    frame = Frame.around(models, points, 0.04, LEAST, (WIDEST, HIGHEST), (NARROWEST, NARROWEST / 3), (LEFT, TOP))
+    frame = Frame.around(
+        models, points, 0.04, LEAST, (WIDEST, HIGHEST), (NARROWEST, NARROWEST / 3), (LEFT, TOP)
+    )
     width = frame.box[2] + RIGHT
     height = frame.box[3] + BOTTOM
     names = labels(models, range(len(models)), MOST_LABELS, frame, points)
@@ -90,6 +92,8 @@ def _model(each: Drawn, frame: Frame) -> str:
     x, y, z = each.model.pose.position
     yaw = each.model.pose.yaw()
     size = " x ".join(f"{part:.2f}" for part in each.size)
-    words = f"{written(each.model.name)}\n{'static' if each.model.static else 'dynamic'}, {size} m\n"
+    words = (
+        f"{written(each.model.name)}\n{'static' if each.model.static else 'dynamic'}, {size} m\n"
+    )
     words += f"pose {x:z.2f}, {y:z.2f}, {z:z.2f} m, yaw {yaw:z.2f} rad, top at {each.top:.2f} m"
     return f'<path class="{" ".join(kinds)}" {color} d="{path_of(each, frame)}"><title>{words}</title></path>'

@@ -9,7 +9,18 @@ from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
-from ddenv.page.blocks import Block, Code, Name, Paragraph, Part, Picture, Report, Strong, Table, parts
+from ddenv.page.blocks import (
+    Block,
+    Code,
+    Name,
+    Paragraph,
+    Part,
+    Picture,
+    Report,
+    Strong,
+    Table,
+    parts,
+)
 from ddenv.text import plain, printable
 
 HERE = Path(__file__).parent
@@ -28,13 +39,22 @@ def html(report: Report) -> str:
         f"<h1>{_text(report.verdict)}</h1>",
         *(_paragraph(each) for each in report.lead),
         '<dl class="figures">',
-        *(f"<div><dt>{_text(what)}</dt><dd>{_text(number)}</dd></div>" for number, what in report.figures),
+        *(
+            f"<div><dt>{_text(what)}</dt><dd>{_text(number)}</dd></div>"
+            for number, what in report.figures
+        ),
         "</dl>",
         "</header>",
     ]
     for section in report.sections:
-        lines += [f"<section><h2>{_text(section.title)}</h2>", *map(_block, section.blocks), "</section>"]
-    return "\n".join([*lines, f"<footer>{_text(report.foot)}</footer>", "</main></body></html>", ""])
+        lines += [
+            f"<section><h2>{_text(section.title)}</h2>",
+            *map(_block, section.blocks),
+            "</section>",
+        ]
+    return "\n".join(
+        [*lines, f"<footer>{_text(report.foot)}</footer>", "</main></body></html>", ""]
+    )
 
 
 def _block(block: Block) -> str:
@@ -49,7 +69,11 @@ def _block(block: Block) -> str:
         case Code():
             text = escape("\n".join(map(printable, block.lines)))
             shown = f"<pre>{text}</pre>"
-            return f"<details><summary>{_text(block.folded)}</summary>{shown}</details>" if block.folded else shown
+            return (
+                f"<details><summary>{_text(block.folded)}</summary>{shown}</details>"
+                if block.folded
+                else shown
+            )
 
 
 def _paragraph(block: Paragraph) -> str:
@@ -58,12 +82,19 @@ def _paragraph(block: Paragraph) -> str:
 
 
 def _table(table: Table) -> str:
-    sides = [' class="number"' if column in table.right else "" for column in range(len(table.head))]
-    head = "".join(f"<th{side}>{_text(title)}</th>" for side, title in zip(sides, table.head, strict=True))
+    sides = [
+        ' class="number"' if column in table.right else "" for column in range(len(table.head))
+    ]
+    head = "".join(
+        f"<th{side}>{_text(title)}</th>" for side, title in zip(sides, table.head, strict=True)
+    )
     rows = []
     for number, row in enumerate(table.rows):
         strong = ' class="strong"' if number in table.strong else ""
-        cells = (f"<td{side}>{''.join(map(_part, parts(cell)))}</td>" for side, cell in zip(sides, row, strict=True))
+        cells = (
+            f"<td{side}>{''.join(map(_part, parts(cell)))}</td>"
+            for side, cell in zip(sides, row, strict=True)
+        )
         rows.append(f"<tr{strong}>{''.join(cells)}</tr>\n")
     return f'<div class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{"".join(rows)}</tbody></table></div>'
 
@@ -87,7 +118,9 @@ _NOTHING = {"default-src": "'none'", "base-uri": "'none'", "form-action": "'none
 
 def policy(allowed: Mapping[str, str]) -> str:
     """A Content-Security-Policy that allows only what `allowed` names, by directive."""
-    return "; ".join(f"{directive} {sources}" for directive, sources in {**_NOTHING, **allowed}.items())
+    return "; ".join(
+        f"{directive} {sources}" for directive, sources in {**_NOTHING, **allowed}.items()
+    )
 
 
 def of_scripts(page: str) -> str:

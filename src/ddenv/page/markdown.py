@@ -6,7 +6,20 @@ import re
 from pathlib import Path
 from urllib.parse import quote
 
-from ddenv.page.blocks import Block, Cell, Code, Name, Paragraph, Part, Picture, Report, Section, Strong, Table, parts
+from ddenv.page.blocks import (
+    Block,
+    Cell,
+    Code,
+    Name,
+    Paragraph,
+    Part,
+    Picture,
+    Report,
+    Section,
+    Strong,
+    Table,
+    parts,
+)
 from ddenv.text import plain, printable
 
 HERE = Path(__file__).parent
@@ -55,13 +68,18 @@ def _block(block: Block, stem: str) -> list[str]:
             words = "".join(map(_part, block.parts))
             return [f"> {words}" if block.notice else _BEGINNING.sub(r"\1\\\2", words)]
         case Table():
-            sides = ("---:" if column in block.right else "---" for column in range(len(block.head)))
+            sides = (
+                "---:" if column in block.right else "---" for column in range(len(block.head))
+            )
             rows = (_row(row, number in block.strong) for number, row in enumerate(block.rows))
             return [_row(block.head, False), f"| {' | '.join(sides)} |", *rows]
         case Picture():
             return [f"![{_text(block.alternative)}]({quote(_file(stem, block))})"]
         case Code():
-            fence = "`" * max(3, 1 + max((len(run) for run in re.findall("`+", "\n".join(block.lines))), default=0))
+            fence = "`" * max(
+                3,
+                1 + max((len(run) for run in re.findall("`+", "\n".join(block.lines))), default=0),
+            )
             shown = [fence, *map(printable, block.lines), fence]
             fold = ["<details>", f"<summary>{block.folded}</summary>", "", *shown, "", "</details>"]
             return fold if block.folded else shown

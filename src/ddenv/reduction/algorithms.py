@@ -50,7 +50,9 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
     while environment:
         n = min(n, len(environment))
         partitions = _split(environment, n, guide)
-        ranked = sorted(zip(partitions, guide.rank(partitions), strict=True), key=lambda pair: pair[1])
+        ranked = sorted(
+            zip(partitions, guide.rank(partitions), strict=True), key=lambda pair: pair[1]
+        )
         round = make_round(n, environment, ranked, guide.candidates, guide.complement_order)
         if guide.skip == "implied":
             round = _without_implied(round, missed, guide.proves)
@@ -87,13 +89,18 @@ def _halved(partitions: list[Partition], n: int, guide: Guide) -> list[Partition
         largest = max(range(len(parts)), key=lambda place: len(parts[place]))
         models = parts[largest]
         scores = guide.rank(one_model_partitions(models))
-        line = tuple(model for _, model in sorted(zip(scores, models, strict=True), key=lambda pair: pair[0]))
+        line = tuple(
+            model for _, model in sorted(zip(scores, models, strict=True), key=lambda pair: pair[0])
+        )
         parts[largest : largest + 1] = [line[: len(line) // 2], line[len(line) // 2 :]]
     return parts
 
 
 def _missed(
-    round: Round, winner: Candidate | None, missed: list[Environment], broke: Callable[[Candidate], bool]
+    round: Round,
+    winner: Candidate | None,
+    missed: list[Environment],
+    broke: Callable[[Candidate], bool],
 ) -> list[Environment]:
     """Groups of models of which at least one is needed, provided that f shows whenever everything that it needs is there.
 
@@ -196,7 +203,9 @@ def splitting(elements: Partition, guide: Guide) -> Search:
     Noisy binary search (Burnashev and Zigangirov, 1974) for the farthest needed model, with the guide's probabilities as prior.
     """
     scores = guide.rank(one_model_partitions(elements)) if elements else []
-    line = tuple(model for model, _ in sorted(zip(elements, scores, strict=True), key=lambda pair: -pair[1]))
+    line = tuple(
+        model for model, _ in sorted(zip(elements, scores, strict=True), key=lambda pair: -pair[1])
+    )
     weight = dict(zip(line, -np.log1p(-guide.chances(line)), strict=True))
     environment = line
     passed = found = 0.0
@@ -272,7 +281,9 @@ def sweep(environment: Partition, runs: int | None = None) -> Search:
     return Environment.of(environment)
 
 
-def tried_again(environment: Partition, groups: Sequence[Partition], search: Callable[[Partition], Search]) -> Search:
+def tried_again(
+    environment: Partition, groups: Sequence[Partition], search: Callable[[Partition], Search]
+) -> Search:
     """Leaves out each group, or halves of it where that fails; then searches what is left. For a search that stepped back."""
     waiting = list(reversed(groups))
     while waiting:

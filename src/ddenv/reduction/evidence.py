@@ -72,7 +72,9 @@ class Evidence:
     miss_chance: float = 0.0
     delta: float = 0.5
     seed: int = 0
-    _nearest: dict[str, tuple[float, float]] = field(default_factory=dict, repr=False, compare=False)
+    _nearest: dict[str, tuple[float, float]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     def need(self, what: str) -> Any:
         """The value of the field `what`. Raises Lacking if it is unknown."""
@@ -94,7 +96,9 @@ class Evidence:
         """The mean position of each partition, shape (len(partitions), 3), m. Raises Lacking."""
         places = self.places(tuple(name for partition in partitions for name in partition))
         sizes = np.array(list(map(len, partitions)))
-        return np.asarray(np.add.reduceat(places, np.cumsum(sizes) - sizes, axis=0) / sizes[:, None])
+        return np.asarray(
+            np.add.reduceat(places, np.cumsum(sizes) - sizes, axis=0) / sizes[:, None]
+        )
 
     def nearest(self, models: Names) -> Floats:
         """For each of `models`, how near the robot's path comes to it (m) and when (s): shape (len(models), 2). Raises Lacking.
@@ -102,7 +106,9 @@ class Evidence:
         """
         if not self._nearest:
             times = self.need("trajectory")[:, 0]
-            pairs = zip(*nearest_on_path(self.places(self.elements), times, self.path()), strict=True)
+            pairs = zip(
+                *nearest_on_path(self.places(self.elements), times, self.path()), strict=True
+            )
             self._nearest.update(zip(self.elements, pairs, strict=True))
         return np.array([self._nearest[name] for name in models]).reshape(-1, 2)
 
@@ -115,7 +121,11 @@ def distances_to_failure(environment: Names, evidence: Evidence) -> Floats:
     """A lower bound of each model's distance from the end of f, shape (len(environment),), m. Raises Lacking."""
     end = np.array(evidence.need("failure_position"))
     apart = np.linalg.norm(evidence.places(environment) - end, axis=1)
-    sizes = [evidence.traits[name].size for name in environment] if evidence.traits else np.zeros(len(environment))
+    sizes = (
+        [evidence.traits[name].size for name in environment]
+        if evidence.traits
+        else np.zeros(len(environment))
+    )
     return np.asarray(np.maximum(apart - np.array(sizes) / 2, 0.0))
 
 
@@ -123,7 +133,9 @@ def spatial_prior(environment: Names, evidence: Evidence) -> Floats:
     """The probability that each model is needed, shape (len(environment),): it falls with the rank of its distance to f, as
     1 / rank, and has no scale. Raises Lacking.
     """
-    ranks = np.argsort(np.argsort(distances_to_failure(environment, evidence), kind="stable"), kind="stable")
+    ranks = np.argsort(
+        np.argsort(distances_to_failure(environment, evidence), kind="stable"), kind="stable"
+    )
     return np.asarray(np.clip(DENSITY / (1.0 + ranks), LEAST, MOST))
 
 
@@ -143,7 +155,9 @@ def nearest_on_path(places: Floats, times: Floats, path: Floats) -> tuple[Floats
         nearest = apart.argmin(axis=1)
         rows = np.arange(len(nearest))
         distances[block] = apart[rows, nearest]
-        moments[block] = times[nearest] + fraction[rows, nearest] * (times[nearest + 1] - times[nearest])
+        moments[block] = times[nearest] + fraction[rows, nearest] * (
+            times[nearest + 1] - times[nearest]
+        )
     return distances, moments
 
 
@@ -153,5 +167,8 @@ def to_segments(places: Floats, path: Floats) -> tuple[Floats, Floats]:
     lengths = np.einsum("ij,ij->i", steps, steps)
     along = places @ steps.T - np.einsum("ij,ij->i", path[:-1], steps)
     fraction = np.clip(along / np.where(lengths > 0, lengths, 1.0), 0.0, 1.0)
-    gaps = [places[:, None, axis] - path[None, :-1, axis] - fraction * steps[None, :, axis] for axis in range(3)]
+    gaps = [
+        places[:, None, axis] - path[None, :-1, axis] - fraction * steps[None, :, axis]
+        for axis in range(3)
+    ]
     return np.sqrt(sum(gap * gap for gap in gaps)), fraction

@@ -49,7 +49,12 @@ class Guide:
 
 
 def make_guide(
-    partitioning: str, prioritization: str, evidence: Callable[[], Evidence], *, prior: str = "spatial", **more: Any
+    partitioning: str,
+    prioritization: str,
+    evidence: Callable[[], Evidence],
+    *,
+    prior: str = "spatial",
+    **more: Any,
 ) -> Guide:
     """A guide for the schemas of these names, which look at what `evidence()` returns at that moment, and see models by name.
 
@@ -67,14 +72,18 @@ def make_guide(
             partitions = [tuple(part) for part in split(names, n, known)]
         models = [name for part in partitions for name in part]
         if not all(partitions) or Counter(models) != Counter(names):
-            raise UserError(f"partitioning '{partitioning}': its partitions must be disjoint, not empty, and cover E")
+            raise UserError(
+                f"partitioning '{partitioning}': its partitions must be disjoint, not empty, and cover E"
+            )
         numbers = {name: number for number, name in enumerate(known.elements)}
         return [tuple(map(numbers.__getitem__, part)) for part in partitions]
 
     def rank_now(partitions: Sequence[Partition]) -> list[float]:
         known = evidence()
         with _told("prioritization", prioritization):
-            scores = [float(score) for score in rank([known.names(part) for part in partitions], known)]
+            scores = [
+                float(score) for score in rank([known.names(part) for part in partitions], known)
+            ]
         if len(scores) != len(partitions) or any(map(math.isnan, scores)):
             expected = f"a score for each of {len(partitions)} partitions"
             raise UserError(f"prioritization '{prioritization}': expected {expected}")
@@ -112,4 +121,6 @@ def _told(kind: schemas.Kind, name: str) -> Iterator[None]:
     except Lacking as lacking:
         what = _ARGUMENTS.get(str(lacking), str(lacking))
         others = ", ".join(other for other in schemas.names(kind) if other != name)
-        raise UserError(f"{kind} '{name}' needs {what}, which is missing; or use one of {others}") from None
+        raise UserError(
+            f"{kind} '{name}' needs {what}, which is missing; or use one of {others}"
+        ) from None

@@ -118,11 +118,16 @@ class Driver(Runs, Protocol):
         """Fresh runs have shown this."""
 
 
-def isolation(driver: Driver, asked: Asked, checks: Sequence[Checked] = ()) -> Work[Environment | None]:
+def isolation(
+    driver: Driver, asked: Asked, checks: Sequence[Checked] = ()
+) -> Work[Environment | None]:
     """Returns what has to go so that the robot passes; None if no such world is found. `checks` are known already."""
     checks = list(checks)
     while len(checks) < MOST_CHECKS:
-        refuted = {asked.whole, *(asked.whole - check.removed for check in checks if not check.passes)}
+        refuted = {
+            asked.whole,
+            *(asked.whole - check.removed for check in checks if not check.passes),
+        }
         smaller = _smaller(asked, checks[-1], refuted) if checks else NOTHING
         if checks and checks[-1].passes and not smaller:
             return checks[-1].removed
@@ -136,12 +141,16 @@ def isolation(driver: Driver, asked: Asked, checks: Sequence[Checked] = ()) -> W
 
 def _smaller(asked: Asked, check: Checked, refuted: set[Environment]) -> Environment:
     """What is enough to remove if a check shows that a model may stay; nothing where that was refuted."""
-    needless = next((claim.model for claim in check.claims if claim.claim.verdict == "not needed"), None)
+    needless = next(
+        (claim.model for claim in check.claims if claim.claim.verdict == "not needed"), None
+    )
     smaller = NOTHING if needless is None else check.removed - asked.stacks.by_first[needless]
     return NOTHING if asked.whole - smaller in refuted else smaller
 
 
-def _search(driver: Runs, asked: Asked, smaller: Environment, refuted: set[Environment]) -> Work[Environment]:
+def _search(
+    driver: Runs, asked: Asked, smaller: Environment, refuted: set[Environment]
+) -> Work[Environment]:
     """What has to go, by the seeds of the search; nothing if the robot does not pass without all that may go."""
     within = tuple(model for model in asked.suspects if model in smaller)
     searching = ddmin(within) if smaller else isolating(asked.suspects, asked.size)
@@ -164,7 +173,11 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Wor
     """Fresh runs show whether the world without `removed` passes, and whether it does with each model of it put back."""
     passing = asked.whole - removed
     error = error_of(number + 1) / 2.0
-    backs = {model: passing | asked.stacks.by_first[model] for model in asked.suspects if model in removed}
+    backs = {
+        model: passing | asked.stacks.by_first[model]
+        for model in asked.suspects
+        if model in removed
+    }
     rule = asked.rule
     first = asked.first_run + number * asked.block
     if isinstance(rule, Each):
@@ -176,7 +189,9 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Wor
             shown = {run: driver.shown(with_it, run, full=True) for run in rule.exact}
             known = tuple(run for run, one in shown.items() if one is not None)
             missed = False in shown.values()
-            claim = Claim(verdict="needed" if missed else "not needed" if known == rule.exact else "not shown")
+            claim = Claim(
+                verdict="needed" if missed else "not needed" if known == rule.exact else "not shown"
+            )
             named.append(NamedClaim(model, with_it, claim, known))
         return Checked(removed, tuple(named))
     certain = replace(rule, error=error)
@@ -187,7 +202,11 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Wor
             yield model, with_it, falls(with_it, passing, error, asked.keep_rate)
 
     def ends(claim: NamedClaim) -> bool:
-        return claim.claim.verdict != "passes" if claim.model is None else claim.claim.verdict == "not needed"
+        return (
+            claim.claim.verdict != "passes"
+            if claim.model is None
+            else claim.claim.verdict == "not needed"
+        )
 
     return Checked(removed, (yield from settled(driver, claims(), ends, first, "isolate")))
 
@@ -204,8 +223,16 @@ def isolating(suspects: Partition, first: int) -> Search:
         whole = Environment.of(suspects)
         models = Environment.of(group)
         # Its one candidate may be all suspects.
-        candidate = Candidate(kind="partition", partition=0, part=group, models=models, lacks=whole - models)
-        winner = yield Round(n_partitions=1, environment=suspects, partitions=(group,), scores=(0.0,), candidates=(candidate,))
+        candidate = Candidate(
+            kind="partition", partition=0, part=group, models=models, lacks=whole - models
+        )
+        winner = yield Round(
+            n_partitions=1,
+            environment=suspects,
+            partitions=(group,),
+            scores=(0.0,),
+            candidates=(candidate,),
+        )
         if winner is not None:
             return (yield from ddmin(group))
         if size >= len(suspects):

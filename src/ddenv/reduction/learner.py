@@ -9,7 +9,14 @@ from scipy.spatial.distance import cdist
 from sklearn.linear_model import SGDClassifier
 
 from ddenv.arrays import Booleans, Floats, Integers
-from ddenv.reduction.evidence import LEAST, MOST, Evidence, Traits, distances_to_failure, spatial_prior
+from ddenv.reduction.evidence import (
+    LEAST,
+    MOST,
+    Evidence,
+    Traits,
+    distances_to_failure,
+    spatial_prior,
+)
 from ddenv.reduction.partitionings import grouped
 from ddenv.text import Names
 
@@ -103,23 +110,34 @@ class Learner:
         self._taken = len(evidence.trials)
         similar = {trial.models for trial in fresh if trial.similar}
         failed = dict.fromkeys(trial.models for trial in fresh if trial.models not in similar)
-        lacks = np.array([[name not in models for name in self._columns] for models in failed], dtype=bool)
+        lacks = np.array(
+            [[name not in models for name in self._columns] for models in failed], dtype=bool
+        )
         self._failed = np.vstack([self._failed, lacks.reshape(-1, len(self._columns))])
         groups = [group for models in lacks if len(group := self._rows[models & there])]
         if count := int(gone.sum()):
-            self._teach(self._rows[gone], np.zeros(count, dtype=int), np.full(count, 1.0 / count), evidence.seed)
+            self._teach(
+                self._rows[gone],
+                np.zeros(count, dtype=int),
+                np.full(count, 1.0 / count),
+                evidence.seed,
+            )
         for group in groups:
             # The blame within a group is shared as the classifier has it now.
             needed = np.clip(self._classified(group), LEAST, MOST)
             blame = needed / needed.sum()
             weights = np.append(blame, (1.0 - blame) / max(1, len(group) - 1))
-            self._teach(np.vstack([group, group]), np.repeat([1, 0], len(group)), weights, evidence.seed)
+            self._teach(
+                np.vstack([group, group]), np.repeat([1, 0], len(group)), weights, evidence.seed
+            )
         self._lessons += len(groups) + bool(count)
 
     def _teach(self, samples: Floats, labels: Integers, weights: Floats, seed: int) -> None:
         """One step from `samples` (K, F) with `labels` (K,), 1 for needed, and `weights` (K,)."""
         if self._classifier is None:
-            self._classifier = SGDClassifier(loss="log_loss", alpha=REGULARIZATION, average=True, random_state=seed)
+            self._classifier = SGDClassifier(
+                loss="log_loss", alpha=REGULARIZATION, average=True, random_state=seed
+            )
         with warnings.catch_warnings():
             # Early on there may be one label only, about which scikit-learn warns.
             warnings.simplefilter("ignore")
@@ -128,7 +146,11 @@ class Learner:
     def _classified(self, samples: Floats) -> Floats:
         """The classifier's probability for each of `samples` (K, F), shape (K,); one half before it has learnt anything."""
         known = self._classifier
-        return np.full(len(samples), 0.5) if known is None else np.asarray(known.predict_proba(samples)[:, 1])
+        return (
+            np.full(len(samples), 0.5)
+            if known is None
+            else np.asarray(known.predict_proba(samples)[:, 1])
+        )
 
 
 def _scaling(logits: Floats, gone: Floats, groups: Booleans) -> tuple[float, float]:
@@ -174,7 +196,9 @@ def beliefs(prior: Floats, groups: Booleans, miss_chance: float = 0.0) -> Floats
         spared = np.where(groups, -np.logaddexp(0.0, odds), 0.0)
         others = np.exp(spared.sum(axis=1, keepdims=True) - spared)
         unexplained = 1.0 - others + others * miss_chance
-        messages = (messages + np.where(groups, -np.log(np.clip(unexplained, LEAST, 1.0)), 0.0)) / 2.0
+        messages = (
+            messages + np.where(groups, -np.log(np.clip(unexplained, LEAST, 1.0)), 0.0)
+        ) / 2.0
     return sigmoid(before + messages.sum(axis=0))
 
 

@@ -64,7 +64,9 @@ def trajectoryseg(environment: Names, n_partitions: int, evidence: Evidence) -> 
 
 def by_span(environment: Names, cuts: Floats, evidence: Evidence) -> list[Names]:
     """Groups the models by the span of time, between sorted `cuts` (s), in which the robot was nearest to them."""
-    return grouped(environment, np.searchsorted(cuts, evidence.nearest(environment)[:, 1], side="left"))
+    return grouped(
+        environment, np.searchsorted(cuts, evidence.nearest(environment)[:, 1], side="left")
+    )
 
 
 def cuts(trajectory: Floats, delta: float, n_spans: int) -> Floats:

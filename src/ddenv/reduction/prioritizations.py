@@ -49,7 +49,10 @@ def timestep(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
     The scores are in s.
     """
     first = evidence.need("first_sensed")
-    return [min((first.get(name, math.inf) for name in partition), default=math.inf) for partition in partitions]
+    return [
+        min((first.get(name, math.inf) for name in partition), default=math.inf)
+        for partition in partitions
+    ]
 
 
 def sequential(partitions: Sequence[Names], evidence: Evidence) -> list[float]:

@@ -139,7 +139,9 @@ class NamedClaim:
     @property
     def runs(self) -> Numbers:
         """The fresh runs of its environment on which it rests, counted from the certificate's first one."""
-        return tuple(run for environment, run in self.claim.rests_on if environment == self.environment)
+        return tuple(
+            run for environment, run in self.claim.rests_on if environment == self.environment
+        )
 
 
 @dataclass(frozen=True)
@@ -217,7 +219,9 @@ class Driver(Runs, Protocol):
     def certified(self, made: Certified) -> None:
         """A certificate is finished."""
 
-    def stepped_back(self, place: int, again: tuple[Partition, ...], tests: tuple[NumberedRun, ...]) -> Leg:
+    def stepped_back(
+        self, place: int, again: tuple[Partition, ...], tests: tuple[NumberedRun, ...]
+    ) -> Leg:
         """What is left lost the rate, by these fresh tests, as (environment, run): the search goes back to place number `place` of
         the chain, and leaves out the groups `again` first. The environment at `place` + 1 and all its parts are not taken again.
         """
@@ -315,7 +319,11 @@ def _round(driver: Driver, leg: Leg, number: int, round: Round) -> Work[Candidat
 
 
 def judge(
-    driver: Runs, environments: Sequence[Environment], rule: Rule, why: str, usual: Rule | None = None
+    driver: Runs,
+    environments: Sequence[Environment],
+    rule: Rule,
+    why: str,
+    usual: Rule | None = None,
 ) -> Work[int | None]:
     """Tests environments until one is similar by `rule`; returns its place, or None when all are judged.
 
@@ -331,12 +339,17 @@ def judge(
             refusals = driver.refusals
         in_full = False
         candidates = islice(environments, judged, None)
-        verdicts, wanted = standing(candidates, driver.shown, rule, driver.refused, first=judged, enough=driver.workers)
+        verdicts, wanted = standing(
+            candidates, driver.shown, rule, driver.refused, first=judged, enough=driver.workers
+        )
         for verdict in verdicts:
             if not verdict:
                 break
             environment = environments[judged]
-            if verdict == "similar" and (run := unproven(driver.shown, environment, rule)) is not None:
+            if (
+                verdict == "similar"
+                and (run := unproven(driver.shown, environment, rule)) is not None
+            ):
                 wanted = [(judged, run)]
                 in_full = True
                 break
@@ -348,7 +361,9 @@ def judge(
                 # By these runs alone: more of them may have ended.
                 decision = decided_by(driver.shown, environment, rule)
                 missed = (
-                    verdict == "dissimilar" and usual is not None and not usual.verdict(decision.shown, decision.missed)
+                    verdict == "dissimilar"
+                    and usual is not None
+                    and not usual.verdict(decision.shown, decision.missed)
                 )
                 driver.judged(judged, environment, "missed" if missed else verdict, decision.runs)
             if verdict == "similar":
@@ -356,7 +371,10 @@ def judge(
             judged += 1
         if not wanted:
             return None
-        yield tuple(Test(environment=environments[index], run=run, why=why, candidate=index, full=in_full) for index, run in wanted)
+        yield tuple(
+            Test(environment=environments[index], run=run, why=why, candidate=index, full=in_full)
+            for index, run in wanted
+        )
 
 
 def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Certified]:
@@ -372,7 +390,11 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
     def ends(claim: NamedClaim) -> bool:
         verdict = claim.claim.verdict
         if claim.model is not None:
-            return verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
+            return (
+                verdict == "not needed"
+                and driver.goes_on()
+                and not driver.refused(claim.environment)
+            )
         if verdict != "not shown":
             return verdict == "lost"
         return all(fresh(left, run) is not True for run in claim.runs)
@@ -383,7 +405,9 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
         # The search has made these runs.
         for model, rest in rests.items():
             shown = [driver.shown(rest, run) for run in certificate.exact]
-            open_verdict: Verdict = "unknown" if "broken" in shown else "not shown" if None in shown else "needed"
+            open_verdict: Verdict = (
+                "unknown" if "broken" in shown else "not shown" if None in shown else "needed"
+            )
             claim = Claim(verdict="not needed" if True in shown else open_verdict)
             made = (*made, NamedClaim(model, rest, claim, certificate.exact))
     certified = Certified(certificate, made)
@@ -403,7 +427,11 @@ def _settled_in_turn(
     terms = certificate.terms
 
     def claims(error: float) -> Iterator[tuple[int | None, Environment, Procedure]]:
-        yield None, left, often(left, terms.at_least) if certificate.exact else keeps(left, whole, terms)
+        yield (
+            None,
+            left,
+            often(left, terms.at_least) if certificate.exact else keeps(left, whole, terms),
+        )
         for model, rest in () if certificate.exact else rests.items():
             yield model, rest, falls(rest, left, error)
 
@@ -439,9 +467,15 @@ def settled(
     while True:
         named: list[NamedClaim] = []
         # Each open claim has work for a worker.
-        while not (named and ends(named[-1])) and sum(not one.claim.verdict for one in named) < driver.workers:
+        while (
+            not (named and ends(named[-1]))
+            and sum(not one.claim.verdict for one in named) < driver.workers
+        ):
             if len(named) == len(opened):
-                opened += [(model, world, Settling(procedure)) for model, world, procedure in islice(claims, 1)]
+                opened += [
+                    (model, world, Settling(procedure))
+                    for model, world, procedure in islice(claims, 1)
+                ]
             if len(named) == len(opened):
                 break
             model, environment, settling = opened[len(named)]
@@ -451,7 +485,12 @@ def settled(
         later = zip_longest(*(one.claim.later for one in named))
         without = {one.environment: one.model for one in reversed(named)}
         wants = dict.fromkeys(
-            Test(environment=environment, run=first_run + run, why=why, without=without.get(environment))
+            Test(
+                environment=environment,
+                run=first_run + run,
+                why=why,
+                without=without.get(environment),
+            )
             for tests in (*next_ones, *later)
             for environment, run in filter(None, tests)
         )
@@ -503,7 +542,11 @@ def _settled_in_blocks(
             # Models were taken to be in turn. Blocks that are over do not go on.
             error = in_turn
             models = {}
-        if not models and _left_of(terms, made) >= ENOUGH_BLOCKS * len(rests) > 0 and _have_turn(of_left, fresh):
+        if (
+            not models
+            and _left_of(terms, made) >= ENOUGH_BLOCKS * len(rests) > 0
+            and _have_turn(of_left, fresh)
+        ):
             first = block + 1
             models = _opened(rests, left, error, first)
             continue
@@ -518,7 +561,10 @@ def _settled_in_blocks(
         block = min(run for _, run in wanted)
         order = _in_drawn_order((test for test in wanted if test[1] == block), terms.order_seed)
         made += 1
-        yield tuple(Test(environment=one, run=first_run + run, why="certify", without=without.get(one)) for one, run in order)
+        yield tuple(
+            Test(environment=one, run=first_run + run, why="certify", without=without.get(one))
+            for one, run in order
+        )
 
 
 def _fresh(driver: Runs, first_run: int) -> ShownIn:
@@ -526,16 +572,21 @@ def _fresh(driver: Runs, first_run: int) -> ShownIn:
     return lambda environment, run: driver.shown(environment, first_run + run, full=True)
 
 
-def _opened(rests: Mapping[int, Environment], left: Environment, error: float, first: int) -> dict[int, Settling]:
+def _opened(
+    rests: Mapping[int, Environment], left: Environment, error: float, first: int
+) -> dict[int, Settling]:
     """A claim of each model, with runs from block number `first` on."""
     return {model: Settling(falls(rest, left, error, first=first)) for model, rest in rests.items()}
 
 
-def _without_more_runs(named: Iterable[NamedClaim], ended: NamedClaim | None) -> tuple[NamedClaim, ...]:
+def _without_more_runs(
+    named: Iterable[NamedClaim], ended: NamedClaim | None
+) -> tuple[NamedClaim, ...]:
     """What is said of these claims. To a search that goes on after one `ended`, those that are still open are of no use."""
     used = (one for one in named if ended is None or one.model in (None, ended.model))
     return tuple(
-        one if one.claim.verdict else replace(one, claim=replace(one.claim, verdict="not shown")) for one in used
+        one if one.claim.verdict else replace(one, claim=replace(one.claim, verdict="not shown"))
+        for one in used
     )
 
 
@@ -558,7 +609,9 @@ def _have_turn(of_left: NamedClaim, fresh: ShownIn) -> bool:
     return of_what_is_left >= NEEDED_SHARE * (len(with_f) - of_what_is_left)
 
 
-def onward(driver: Driver, leg: Leg, chain: Sequence[Environment], certified: Certified) -> Work[Leg | None]:
+def onward(
+    driver: Driver, leg: Leg, chain: Sequence[Environment], certified: Certified
+) -> Work[Leg | None]:
     """Where the search goes on after a certificate; None if it has come to its end."""
     if not driver.goes_on():
         return None
@@ -568,7 +621,11 @@ def onward(driver: Driver, leg: Leg, chain: Sequence[Environment], certified: Ce
             return (yield from _step_back(driver, chain, certified))
         return None
     for claim in removals:
-        if claim.model is not None and claim.claim.verdict == "not needed" and not driver.refused(claim.environment):
+        if (
+            claim.model is not None
+            and claim.claim.verdict == "not needed"
+            and not driver.refused(claim.environment)
+        ):
             return driver.left_out(claim.model, claim.environment)
     return None
 
@@ -593,9 +650,16 @@ def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certifie
         return claims[environment]
 
     while not isinstance(place := last_good(chain, judged), int):
-        yield tuple(Test(environment=environment, run=first + run, why="certify") for environment, run in place)
+        yield tuple(
+            Test(environment=environment, run=first + run, why="certify")
+            for environment, run in place
+        )
     again = tuple(groups_again(chain[place], chain[place + 1], chain[-1]))
-    tests = tuple((environment, first + run) for claim in claims.values() for environment, run in claim.rests_on)
+    tests = tuple(
+        (environment, first + run)
+        for claim in claims.values()
+        for environment, run in claim.rests_on
+    )
     return driver.stepped_back(place, again, tests)
 
 
@@ -607,7 +671,9 @@ def groups_again(good: Environment, bad: Environment, end: Environment) -> list[
     return [group for group in (later, *halves) if group]
 
 
-def last_good(chain: Sequence[Environment], judged: Callable[[Environment], Claim]) -> int | tuple[NumberedRun, ...]:
+def last_good(
+    chain: Sequence[Environment], judged: Callable[[Environment], Claim]
+) -> int | tuple[NumberedRun, ...]:
     """The place of the last environment of `chain` not shown to have lost the rate, or the tests (models, run) needed to know it.
 
     `chain` ends with what has lost it; the next one has, too. By bisection: it assumes that the rate falls along the chain.

@@ -18,7 +18,14 @@ import numpy as np
 from ddenv.arrays import Floats
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
-from ddenv.evidence.certificate import LONGER, NumberedRun, Terms, Verdict, error_of, tests_in_blocks
+from ddenv.evidence.certificate import (
+    LONGER,
+    NumberedRun,
+    Terms,
+    Verdict,
+    error_of,
+    tests_in_blocks,
+)
 from ddenv.evidence.rates import Shown, anytime_interval, estimated_rate, wilson_interval
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
@@ -182,9 +189,19 @@ def reduce(
     seems_steady = iterations is None and accept_rate is None
     iterations = iterations or 0
     accept_rate = accept_rate or ("kept" if iterations else "first")
-    variants = {"candidates": candidates, "complement_order": complement_order, "growth": growth, "skip": skip}
+    variants = {
+        "candidates": candidates,
+        "complement_order": complement_order,
+        "growth": growth,
+        "skip": skip,
+    }
     _check(
-        **variants, prior=prior, accept_rate=accept_rate, keep_rate=keep_rate, certify_rate=certify_rate, delta=delta
+        **variants,
+        prior=prior,
+        accept_rate=accept_rate,
+        keep_rate=keep_rate,
+        certify_rate=certify_rate,
+        delta=delta,
     )
     if isinstance(most_tests, bool) or not isinstance(most_tests, Integral) or most_tests < 1:
         raise _wrong("most_tests", "a whole number, at least 1", most_tests)
@@ -196,8 +213,24 @@ def reduce(
     places = _each("positions", positions, names, PLACE, _place)
     times = _each("first_sensed", first_sensed, None, "a time in s", _time)
     felt = None if touched is None else frozenset(touched)
-    alike = _each("traits", traits, names, "ddenv.Traits", lambda value: value if isinstance(value, Traits) else None)
-    known = Evidence(elements=names, positions=places, trajectory=path, failure_position=failure, first_sensed=times, touched=felt, traits=alike, delta=float(delta), seed=int(seed))
+    alike = _each(
+        "traits",
+        traits,
+        names,
+        "ddenv.Traits",
+        lambda value: value if isinstance(value, Traits) else None,
+    )
+    known = Evidence(
+        elements=names,
+        positions=places,
+        trajectory=path,
+        failure_position=failure,
+        first_sensed=times,
+        touched=felt,
+        traits=alike,
+        delta=float(delta),
+        seed=int(seed),
+    )
 
     def begin(leg: steps.Leg) -> Search:
         guide = make_guide(
@@ -235,7 +268,11 @@ def reduce(
             caller.iterations = FLAKY_ITERATIONS
     elif not caller.keep_rate:
         if check:
-            caller.carry_out(steps.baseline(caller, caller.whole, baseline_runs if iterations else 1, bool(iterations)))
+            caller.carry_out(
+                steps.baseline(
+                    caller, caller.whole, baseline_runs if iterations else 1, bool(iterations)
+                )
+            )
         minimal = None if caller.search_once() else False
     if caller.keep_rate:
         caller.carry_out(steps.procedure(caller, caller.whole, baseline_runs, keeps_rate=True))
@@ -356,11 +393,17 @@ class _Caller:
         the end; else None.
         """
         if check:
-            self.carry_out((steps.Test(environment=self.whole, run=run, why="baseline"),) for run in range(REPLAYS))
+            self.carry_out(
+                (steps.Test(environment=self.whole, run=run, why="baseline"),)
+                for run in range(REPLAYS)
+            )
             if not all(self._of_whole):
                 return None
         alone = self.search_once()
-        replays = [steps.Test(environment=self.left, run=run, why="certify") for run in range(1, 1 + REPLAYS)]
+        replays = [
+            steps.Test(environment=self.left, run=run, why="certify")
+            for run in range(1, 1 + REPLAYS)
+        ]
         tested = (rest for rest in self._removals() if self.shown(rest, 0) is not None)
         replays += [steps.Test(environment=rest, run=1, why="certify") for rest in tested]
         self.carry_out((test,) for test in replays)
@@ -409,17 +452,33 @@ class _Caller:
         rate = self.rate() if self.keep_rate else 0.0
         # While calls are left it goes back, however often.
         steps_back = min(len(self._lost), steps.MOST_STEPS_BACK - 1)
-        rule = Acceptance(most_misses=1 + self.iterations, rate=rate, keep_rate=self.keep_rate, steps_back=steps_back)
+        rule = Acceptance(
+            most_misses=1 + self.iterations,
+            rate=rate,
+            keep_rate=self.keep_rate,
+            steps_back=steps_back,
+        )
         free = {element: Environment.of((element,)) for element in self.left}
         n_partitions = self._n_partitions.get(self.left)
-        return steps.Leg(first_round=self.rounds + 1, whole=self.whole, chain=self._chain, pinned=NOTHING, free=free, rule=rule, n_partitions=n_partitions, again=again)
+        return steps.Leg(
+            first_round=self.rounds + 1,
+            whole=self.whole,
+            chain=self._chain,
+            pinned=NOTHING,
+            free=free,
+            rule=rule,
+            n_partitions=n_partitions,
+            again=again,
+        )
 
     def round_began(self, number: int, round: Round) -> None:
         self.rounds += 1
         self._n_partitions[self.left] = round.n_partitions
         candidates = tuple((candidate.kind, candidate.partition) for candidate in round.candidates)
         all_models = (round.environment, *round.partitions)
-        environment, *parts = (tuple(self.names[model] for model in models) for models in all_models)
+        environment, *parts = (
+            tuple(self.names[model] for model in models) for models in all_models
+        )
         self._began.append(NamedRound(environment, tuple(parts), candidates))
 
     def judged(self, *_: object) -> None:
@@ -459,7 +518,10 @@ class _Caller:
     def certified(self, made: steps.Certified) -> None:
         claims = []
         for named in made.claims:
-            shown = sum(self._known[named.environment, made.certificate.first_run + run] for run in named.runs)
+            shown = sum(
+                self._known[named.environment, made.certificate.first_run + run]
+                for run in named.runs
+            )
             without = None if named.model is None else self.names[named.model]
             claim = named.claim
             low, high = anytime_interval(shown, len(named.runs))
@@ -533,20 +595,28 @@ def _trajectory(trajectory: Floats | None) -> Floats | None:
     except (TypeError, ValueError):
         path = np.zeros(0)
     if path.ndim != 2 or path.shape[1] != 5 or not len(path) or not (np.abs(path) <= LARGEST).all():
-        raise UserError(f"trajectory: expected finite numbers of shape (N, 5), found shape {path.shape}")
+        raise UserError(
+            f"trajectory: expected finite numbers of shape (N, 5), found shape {path.shape}"
+        )
     if (np.diff(path[:, 0]) < 0).any():
         raise UserError("trajectory: its times, in the first column, must not decrease")
     return path
 
 
 def _each(
-    what: str, values: Mapping[str, Any] | None, names: Names | None, expected: str, read: Callable[[Any], Value | None]
+    what: str,
+    values: Mapping[str, Any] | None,
+    names: Names | None,
+    expected: str,
+    read: Callable[[Any], Value | None],
 ) -> dict[str, Value] | None:
     """What `read` makes of the value of each of `names`, or of all that are there. Raises UserError where it makes nothing."""
     if values is None:
         return None
     if not isinstance(values, Mapping):
-        raise UserError(f"{what}: expected a mapping from names to values, found {type(values).__name__}")
+        raise UserError(
+            f"{what}: expected a mapping from names to values, found {type(values).__name__}"
+        )
     found: dict[str, Value] = {}
     for name in values if names is None else names:
         if (value := read(values.get(name))) is None:

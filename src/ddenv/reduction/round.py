@@ -68,7 +68,10 @@ def make_round(
     """
     count = len(ranked)
     order = range(count) if complement_order == "paper" else range(count - 1, -1, -1)
-    pairs = ((("partition", near), ("complement", far)) for near, far in zip(range(count), order, strict=True))
+    pairs = (
+        (("partition", near), ("complement", far))
+        for near, far in zip(range(count), order, strict=True)
+    )
     wanted = [one for pair in pairs for one in pair if candidates in ("both", f"{one[0]}s")]
     return round_of(n_partitions, environment, ranked, wanted)
 
@@ -95,8 +98,18 @@ def round_of(
         if models in seen or not lacks or (not models and len(environment) > 1):
             continue
         seen.add(models)
-        candidates.append(Candidate(kind=kind, partition=number, part=partitions[number], models=models, lacks=lacks))
-    return Round(n_partitions=n_partitions, environment=environment, partitions=tuple(partitions), scores=tuple(scores), candidates=tuple(candidates))
+        candidates.append(
+            Candidate(
+                kind=kind, partition=number, part=partitions[number], models=models, lacks=lacks
+            )
+        )
+    return Round(
+        n_partitions=n_partitions,
+        environment=environment,
+        partitions=tuple(partitions),
+        scores=tuple(scores),
+        candidates=tuple(candidates),
+    )
 
 
 def in_order(environment: Partition, partitions: Sequence[Partition], *kinds: str) -> Round:
@@ -154,9 +167,15 @@ class Stacks:
                 return Environment.of(self.expanded(end.value))
             candidates = []
             for one in round.candidates:
-                models, lacks = (Environment.of(self.expanded(part)) for part in (one.models, one.lacks))
-                candidates.append(replace(one, part=self.expanded(one.part), models=models, lacks=lacks))
+                models, lacks = (
+                    Environment.of(self.expanded(part)) for part in (one.models, one.lacks)
+                )
+                candidates.append(
+                    replace(one, part=self.expanded(one.part), models=models, lacks=lacks)
+                )
             partitions = tuple(map(self.expanded, round.partitions))
             environment = self.expanded(round.environment)
-            won = yield replace(round, environment=environment, partitions=partitions, candidates=tuple(candidates))
+            won = yield replace(
+                round, environment=environment, partitions=partitions, candidates=tuple(candidates)
+            )
             winner = None if won is None else round.candidates[candidates.index(won)]

@@ -48,7 +48,9 @@ def write_bundle(run: Path, target: Path) -> list[Path]:
         raise UserError(f"{target}: there is no folder {target.absolute().parent}; create it first")
     record = _certified(run)
     # Complete or not there at all.
-    with tempfile.TemporaryDirectory(prefix=".ddenv-bundle-", dir=target.absolute().parent) as temporary:
+    with tempfile.TemporaryDirectory(
+        prefix=".ddenv-bundle-", dir=target.absolute().parent
+    ) as temporary:
         folder = Path(temporary) / target.stem
         folder.mkdir()
         _copy_run(run, folder / RUN, record)
@@ -99,7 +101,9 @@ def _certified(run: Path) -> Record:
 def _copy_run(run: Path, target: Path, record: Record) -> None:
     """A copy with only the trajectories of f and of what the report draws: all would be a hundred times as much."""
     state = record.state
-    drawn = {test for test in (state.evidence_test, *state.failures, *record.ways) if test is not None}
+    drawn = {
+        test for test in (state.evidence_test, *state.failures, *record.ways) if test is not None
+    }
     drawn |= {test.id for test in state.tests if test.phase == "baseline"}
     # An implied test has the trajectories of another one.
     drawn |= {by for test in drawn if (by := state.test(test).implied_by) is not None}
@@ -108,7 +112,9 @@ def _copy_run(run: Path, target: Path, record: Record) -> None:
         with closing(source), closing(sqlite3.connect(target)) as copy:
             source.backup(copy)
             copy.execute("PRAGMA journal_mode = DELETE")
-            copy.execute(f"DELETE FROM motion WHERE test NOT IN ({', '.join(map(str, sorted(drawn)))})")
+            copy.execute(
+                f"DELETE FROM motion WHERE test NOT IN ({', '.join(map(str, sorted(drawn)))})"
+            )
             copy.commit()
             copy.execute("VACUUM")
     except sqlite3.Error as error:
@@ -135,7 +141,12 @@ def _issue(record: Record, needs: list[str]) -> bytes:
     if record.nearest is not None:
         reasons += ["", printable(record.nearest.sentences)]
     if state.margins is not None and rows(state.margins):
-        reasons += ["", "How far numbers can change:", "", *(f"- {printable(words)}" for words in said(state.margins))]
+        reasons += [
+            "",
+            "How far numbers can change:",
+            "",
+            *(f"- {printable(words)}" for words in said(state.margins)),
+        ]
     names = ", ".join(f"`{_code(uri)}`" for uri in needs[:MOST_NAMES])
     return _filled(
         ISSUE,
@@ -151,7 +162,9 @@ def _issue(record: Record, needs: list[str]) -> bytes:
         run=RUN,
         world=_world(record),
         scenario=SCENARIO,
-        files=f"Other programs also need the files that `{_world(record)}` names: {names}.\n" if needs else "",
+        files=f"Other programs also need the files that `{_world(record)}` names: {names}.\n"
+        if needs
+        else "",
         maker=f"ddenv {__version__}; {_code(state.simulator)}",
     )
 

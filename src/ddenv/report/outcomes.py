@@ -6,7 +6,18 @@ import math
 from collections import Counter
 
 from ddenv.evidence.claims import FreshRuns, current, fresh_runs
-from ddenv.page.blocks import Block, Cell, Name, Section, Strong, Table, named, percent, say, thousands
+from ddenv.page.blocks import (
+    Block,
+    Cell,
+    Name,
+    Section,
+    Strong,
+    Table,
+    named,
+    percent,
+    say,
+    thousands,
+)
 from ddenv.report.run_data import Record
 from ddenv.runfile.deeds import DEEDS
 from ddenv.runfile.failures import atlas
@@ -47,7 +58,11 @@ def sureness(record: Record) -> Section | None:
     if not state.tests_done:
         return None
     mixed = (
-        say(Strong("Mixed tests."), f" They were made with {plain(one)}, which do not give the same bits.", notice=True)
+        say(
+            Strong("Mixed tests."),
+            f" They were made with {plain(one)}, which do not give the same bits.",
+            notice=True,
+        )
         for one in state.physics.mixed
     )
     return Section("How certain it is", (*_baseline(state), *_tests(state), *mixed))
@@ -56,7 +71,9 @@ def sureness(record: Record) -> Section | None:
 def _baseline(state: RunState) -> list[Block]:
     base = state.baseline
     if base is None:
-        return [say("The baseline has not ended: how often the whole world fails is not known yet.")]
+        return [
+            say("The baseline has not ended: how often the whole world fails is not known yet.")
+        ]
     words = (
         f"In the whole world the robot {failed_in(state, base)} in {base.failures} of {count(base.runs, 'run')}: "
         f"{percent(base.rate)}, 95 % interval {percent(base.low)} to {percent(base.high)}."
@@ -67,13 +84,19 @@ def _baseline(state: RunState) -> list[Block]:
     if base.rate < 1:
         blocks.append(say(as_sentence(missed(state))))
     if base.others:
-        rows = tuple((str(number), one.name, str(one.runs)) for number, one in enumerate(base.seen, 1))
+        rows = tuple(
+            (str(number), one.name, str(one.runs)) for number, one in enumerate(base.seen, 1)
+        )
         f = {row for row, one in enumerate(base.seen) if one.test == base.failure_test}
         words = (
             "The whole world shows several failures. The run began with the one in bold as f; --failure NUMBER reduces "
             "another one."
         )
-        words += f" The first {count(base.chose, 'run')} only chose it, and are not in its rate." if base.chose else ""
+        words += (
+            f" The first {count(base.chose, 'run')} only chose it, and are not in its rate."
+            if base.chose
+            else ""
+        )
         blocks += [say(words), Table(("number", "failure", "runs"), rows, {0, 2}, f)]
     return blocks
 
@@ -81,12 +104,22 @@ def _baseline(state: RunState) -> list[Block]:
 def _tests(state: RunState) -> list[Block]:
     finished = state.finished_tests
     counts = Counter((test.outcome, test.phase) for test in finished)
-    phases = [(phase, words) for phase, words in PHASES if any(test.phase == phase for test in finished)]
+    phases = [
+        (phase, words) for phase, words in PHASES if any(test.phase == phase for test in finished)
+    ]
     rows = []
     for outcome, number in state.outcomes().items():
         if number:
             by_phase = (str(counts[outcome, phase] or "–") for phase, _ in phases)
-            rows.append((outcome, str(number), percent(number / state.tests_done), *by_phase, _meaning(state, outcome)))
+            rows.append(
+                (
+                    outcome,
+                    str(number),
+                    percent(number / state.tests_done),
+                    *by_phase,
+                    _meaning(state, outcome),
+                )
+            )
     head = ("outcome", "tests", "share", *(words for _, words in phases), "meaning")
     table = Table(head, rows, range(1, 3 + len(phases)))
     # Before the end of the run, anything may still come to be needed.
@@ -95,7 +128,9 @@ def _tests(state: RunState) -> list[Block]:
         f"Of these tests {thousands(state.deflake_runs)} were re-runs of candidates whose first test did not show f, and "
         f"{thousands(state.cut_tests)} ended early: {WHY}"
     )
-    idle = f"; {thousands(ahead)} were started early by idle workers and not needed" if ahead else ""
+    idle = (
+        f"; {thousands(ahead)} were started early by idle workers and not needed" if ahead else ""
+    )
     off = [say(as_sentence(said))] if (said := why_off(state)) else []
     return [table, say(f"{words}{idle}."), *off, *_slices(state)]
 
@@ -104,7 +139,11 @@ def _slices(state: RunState) -> list[Block]:
     """What was known, and what went, without a test."""
     blocks: list[Block] = []
     if state.implied:
-        audits = f"; {thousands(state.audits)} more were simulated anyway, for comparison" if state.audits else ""
+        audits = (
+            f"; {thousands(state.audits)} more were simulated anyway, for comparison"
+            if state.audits
+            else ""
+        )
         known = f"{thousands(state.implied)} of the tests were not simulated: finished runs imply them{audits}."
         blocks.append(say(f"{known} {TEACHING}"))
     for node in state.nodes:
@@ -118,11 +157,23 @@ def _slices(state: RunState) -> list[Block]:
 def _meaning(state: RunState, outcome: str) -> str:
     meaning = MEANING[outcome]
     if outcome == "other":
-        ways = Counter(test.failure for test in state.tests if test.outcome == "other" and test.failure in DEEDS)
-        meaning += f" ({', '.join(f'{word} {times}' for word, times in ways.most_common())})" if ways else ""
+        ways = Counter(
+            test.failure
+            for test in state.tests
+            if test.outcome == "other" and test.failure in DEEDS
+        )
+        meaning += (
+            f" ({', '.join(f'{word} {times}' for word, times in ways.most_common())})"
+            if ways
+            else ""
+        )
     if outcome in BROKEN:
         last = next((test for test in reversed(state.tests) if test.outcome == outcome), None)
-        meaning += f", the last time: {plain(last.failure)[:200]}" if last is not None and last.failure else ""
+        meaning += (
+            f", the last time: {plain(last.failure)[:200]}"
+            if last is not None and last.failure
+            else ""
+        )
     return meaning
 
 
@@ -141,7 +192,9 @@ def others_met(record: Record) -> Section | None:
     rows = []
     for each in found[:MOST]:
         size = f"{count(each.size, 'model')} (test {each.smallest})"
-        away = "" if state.f_position is None else f"{math.dist(state.f_position, each.position):.2f}"
+        away = (
+            "" if state.f_position is None else f"{math.dist(state.f_position, each.position):.2f}"
+        )
         models = named(state.models_of(state.test(each.smallest)), MOST_NAMES) or "none"
         rows.append((each.name, away, thousands(len(each.tests)), size, models))
     more = len(found) - MOST
@@ -158,12 +211,18 @@ def worth(record: Record) -> Section | None:
     rows = [each for each in fresh_runs(state)[:MOST_ROWS] if each.shows]
     if found is not None:
         return Section("What the result is worth", tuple(_with(state, found)))
-    claimed = "what its runs have shown so far still holds" if rows else "nothing is claimed about what is left"
+    claimed = (
+        "what its runs have shown so far still holds"
+        if rows
+        else "nothing is claimed about what is left"
+    )
     so_far = drift(state)
     first = as_sentence(f"{missing(state)}: {claimed}")
     blocks: list[Block] = [say(first, f" From all runs so far: {so_far[0]}." if so_far else "")]
     if rows:
-        shown = [(_name(each), thousands(each.runs), thousands(each.shown), each.shows) for each in rows]
+        shown = [
+            (_name(each), thousands(each.runs), thousands(each.shown), each.shows) for each in rows
+        ]
         blocks.append(Table(("environment", "runs", "with f", "shown"), shown, {1, 2}))
     return Section("What the result is worth", tuple(blocks))
 
@@ -176,16 +235,14 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
         has_rate = each.runs and not each.is_chosen
         shown = percent(each.shown / each.runs) if has_rate else "–"
         is_exact = each.claim is not None and each.claim.is_exact
-        interval = f"{percent(each.low)} to {percent(each.high)}" if has_rate and not is_exact else "–"
+        interval = (
+            f"{percent(each.low)} to {percent(each.high)}" if has_rate and not is_exact else "–"
+        )
         meaning = each.shows if each.claim is None else means(state, found, each.claim)
         rows.append((_name(each), thousands(each.runs), ended, shown, interval, meaning))
-    words = (
-        "These runs have seeds that the search did not use, and none of them ended early. Rates exclude broken runs."
-    )
+    words = "These runs have seeds that the search did not use, and none of them ended early. Rates exclude broken runs."
     if found.seeds:
-        words = (
-            "What is left ran with seeds that the search did not use; without each model it ran with the chosen seeds."
-        )
+        words = "What is left ran with seeds that the search did not use; without each model it ran with the chosen seeds."
     if state.certified:
         words += f" {as_sentence(promise(state, found))}"
     return [Table(head, rows, {1, 3, 4}, {0}), say(words)]

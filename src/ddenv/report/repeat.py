@@ -27,9 +27,13 @@ def settings(record: Record) -> Section:
     oracle = section(scenario, "oracle")
     rows: list[tuple[str, Name, str]] = []
     for one in SETTINGS.values():
-        if (one.name in section(scenario, one.section) or not one.stored) and not (oracle and one.name in OF_DRAKE):
+        if (one.name in section(scenario, one.section) or not one.stored) and not (
+            oracle and one.name in OF_DRAKE
+        ):
             # With the first value, if it was changed during the run.
-            now, first = (value_words(read(each, one)) or one.none for each in (scenario, record.asked))
+            now, first = (
+                value_words(read(each, one)) or one.none for each in (scenario, record.asked)
+            )
             value = now if first == now else f"{now} (changed during the run; initially {first})"
             rows += [(one.label, Name(value), one.meaning)] if value else []
     rows += [(JOBS.label, Name(str(jobs)), JOBS.meaning)] if jobs else []

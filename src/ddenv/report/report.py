@@ -7,7 +7,18 @@ from pathlib import Path
 from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
-from ddenv.page.blocks import Paragraph, Part, Report, Strong, duration, moment, named, percent, say, thousands
+from ddenv.page.blocks import (
+    Paragraph,
+    Part,
+    Report,
+    Strong,
+    duration,
+    moment,
+    named,
+    percent,
+    say,
+    thousands,
+)
 from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
 from ddenv.report.outcomes import others_met, rate_of_left, sureness, worth
@@ -29,10 +40,22 @@ MOST_NAMES = 6
 
 def content(record: Record) -> Report:
     state = record.state
-    about = (what_is_left, worth, why, margins, way, guiding, others_met, sureness, settings, repeat)
+    about = (
+        what_is_left,
+        worth,
+        why,
+        margins,
+        way,
+        guiding,
+        others_met,
+        sureness,
+        settings,
+        repeat,
+    )
     sections = [each(record) for each in about]
     damage = (
-        say(Strong("Parts of this run could not be read."), f" {plain(each)}.", notice=True) for each in record.troubles
+        say(Strong("Parts of this run could not be read."), f" {plain(each)}.", notice=True)
+        for each in record.troubles
     )
     version = plain(state.engine_version)
     begun = moment(record.started)
@@ -66,7 +89,9 @@ def _standing(record: Record) -> Paragraph:
     why = plain(ended(state) if state.status == "finished" else state.reason).rstrip(".")
     if state.status == "finished" and state.certified:
         if not state.environment:
-            return say(Strong("Minimal."), " Look at the robot, its goal, and the models that always stay.")
+            return say(
+                Strong("Minimal."), " Look at the robot, its goal, and the models that always stay."
+            )
         return say(Strong("Minimal:"), f" {why}.")
     reason = f": {why}" if why else ""
     at = f" at {moment(state.updated_at)} UTC" if moment(state.updated_at) else ""
@@ -77,7 +102,11 @@ def _standing(record: Record) -> Paragraph:
         "created": ("Not started yet:", " no test has been made."),
     }.get(state.status, ("This run has not ended.", f" This report shows what was known{at}."))
     if not (state.ended or state.status == "created" or record.alive):
-        words = f" The engine is not running; its last message came{at}." if at else " The engine is not running."
+        words = (
+            f" The engine is not running; its last message came{at}."
+            if at
+            else " The engine is not running."
+        )
     return say(Strong(title), words, notice=True)
 
 
@@ -87,10 +116,14 @@ def _failure(state: RunState) -> list[Paragraph]:
     position = state.f_position
     said = [say(description)] if description else []
     if position is not None:
-        said.append(say(f"The failure f: the robot {deed(state.failure)} at ({coordinates(position)}) m."))
+        said.append(
+            say(f"The failure f: the robot {deed(state.failure)} at ({coordinates(position)}) m.")
+        )
     elif state.tests_done:
         seen = count(state.tests_done, "run")
-        said.append(say(f"The whole world is run first to determine the failure: {seen} ended so far."))
+        said.append(
+            say(f"The whole world is run first to determine the failure: {seen} ended so far.")
+        )
     notes = (plain(each) for _, each in state.notes)
     return [*said, *(say(as_sentence(words), notice=True) for words in notes)]
 
@@ -130,10 +163,14 @@ def write_report(run: Path, file: Path, force: bool = False) -> list[Path]:
         texts = {file: html(report)}
     else:
         drawn = pictures(report, file.stem)
-        texts = {file.with_name(name): svg for name, svg in drawn.items()} | {file: markdown(report, file.stem)}
+        texts = {file.with_name(name): svg for name, svg in drawn.items()} | {
+            file: markdown(report, file.stem)
+        }
     there = [path for path in texts if is_there(path)]
     if there and not force:
-        raise UserError(f"{there[-1]}: exists already; choose another name, or replace it with --force")
+        raise UserError(
+            f"{there[-1]}: exists already; choose another name, or replace it with --force"
+        )
     for path, text in texts.items():
         write_file(path, text.encode(errors="replace"))
     return list(reversed(texts))

@@ -88,7 +88,9 @@ def picture(
     across = WIDTH - LEFT - RIGHT
     # As wide as the page, and never too flat.
     sizes = (across, HIGHEST), (across, LEAST_HIGH)
-    frame = Frame.around(record.models, list(_places(record).values()), 0.03, LEAST, *sizes, (LEFT, TOP))
+    frame = Frame.around(
+        record.models, list(_places(record).values()), 0.03, LEAST, *sizes, (LEFT, TOP)
+    )
     if ways is None:
         last = record.evidence if record.evidence is not record.original else None
         ways = {"way": record.original, "last": last}
@@ -97,7 +99,9 @@ def picture(
     sorts = {each.model.name: _sort(record, each.model.name) for each in models}
     coarse = sum(len(each.outline.polygons) for each in models) > MOST_POLYGONS
     drawn = {way: path for way, samples in ways.items() if (path := _way(samples, frame))}
-    outlines = [(LIMITS[verdict], ring) for verdict, model, moved in limits for ring in rings(model, moved)]
+    outlines = [
+        (LIMITS[verdict], ring) for verdict, model, moved in limits for ring in rings(model, moved)
+    ]
     shown = {*sorts.values(), *drawn, *places, *(sign for sign, _ in outlines)}
     legend = [name for name in WORDS if name in shown]
     bottom = float(frame.box[3]) + AXIS
@@ -109,7 +113,11 @@ def picture(
         *_near(record, frame, places),
     ]
     # By default what is left has a name, or keeps names away; a name may cover the rest, which is faint.
-    own = [one for one in models if (sorts[one.model.name] != "gone" if named is None else one.model.name in named)]
+    own = [
+        one
+        for one in models
+        if (sorts[one.model.name] != "gone" if named is None else one.model.name in named)
+    ]
     own = own[-MOST_AVOIDED:]
     wanted = [index for index, each in enumerate(own) if sorts[each.model.name] != "still"]
     names = labels(own, wanted, MOST_LABELS, frame, list(places.values()), 11.0)
@@ -160,7 +168,10 @@ def _line(frame: Frame, points: np.ndarray) -> str:
 def _near(record: Record, frame: Frame, places: Mapping[str, Point]) -> Iterator[str]:
     """Circles: where the goal counts as reached, and where similar runs end, from above."""
     reach = record.scenario.goal.tolerance if record.scenario is not None else 0.0
-    for sign, radius, name in (("goal", reach, "reach"), ("end", settings(record.state).epsilon, "around")):
+    for sign, radius, name in (
+        ("goal", reach, "reach"),
+        ("end", settings(record.state).epsilon, "around"),
+    ):
         if sign in places and 0 < radius < FAR:
             x, y = frame.pixel(places[sign])
             yield f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{min(FAR, radius * frame.scale):.1f}"/>'

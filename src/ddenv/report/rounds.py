@@ -31,13 +31,17 @@ def way(record: Record) -> Section | None:
 def _rounds(record: Record) -> list[Block]:
     state = record.state
     rounds = record.rounds
-    tests = Counter(test.round for test in state.tests if test.phase == "round" and test.is_finished)
+    tests = Counter(
+        test.round for test in state.tests if test.phase == "round" and test.is_finished
+    )
     explained = "A round tries one set of models after another; the first one that shows f becomes the environment."
     if any(_tried(each) and not tests[each.number] for each in rounds):
         explained += " Sets judged before are not tested again."
     shown = rounds
     if len(rounds) > MOST_ROUNDS:
-        shown = tuple(each for each in rounds if each.winner is not None or each in (rounds[0], rounds[-1]))
+        shown = tuple(
+            each for each in rounds if each.winner is not None or each in (rounds[0], rounds[-1])
+        )
         explained += f" Not listed: {count(len(rounds) - len(shown), 'round')} without a reduction."
     undone = {node.round for node in state.nodes if node.rejected and node.how == "reduced"}
     rows = [_row(state, each, tests[each.number], each.number in undone) for each in shown]
@@ -47,7 +51,10 @@ def _rounds(record: Record) -> list[Block]:
 
 def _tried(round: Round) -> int:
     """The number of its candidates that were judged or have tests."""
-    return sum(one.verdict in ("similar", "missed", "dissimilar") or bool(one.tests) for one in round.candidates)
+    return sum(
+        one.verdict in ("similar", "missed", "dissimilar") or bool(one.tests)
+        for one in round.candidates
+    )
 
 
 def _row(state: RunState, round: Round, tests: int, undone: bool) -> tuple[Cell, ...]:
@@ -55,7 +62,12 @@ def _row(state: RunState, round: Round, tests: int, undone: bool) -> tuple[Cell,
     verdicts = Counter(one.verdict for one in round.candidates)
     if won is not None:
         first = f"{won.label}{', taken back' if undone else ''}"
-    elif not state.ended and not round.done and state.round is not None and round.number == state.round.number:
+    elif (
+        not state.ended
+        and not round.done
+        and state.round is not None
+        and round.number == state.round.number
+    ):
         first = "under way"
     else:
         first = "not finished" if verdicts[""] else "none"
@@ -71,7 +83,10 @@ def guiding(record: Record) -> Section | None:
     state = record.state
     blocks: list[Block] = []
     if state.decisions:
-        rows = [(moment(each.time), str(each.tests), str(each.node), plain(each.words)) for each in state.decisions]
+        rows = [
+            (moment(each.time), str(each.tests), str(each.node), plain(each.words))
+            for each in state.decisions
+        ]
         lead = "by hand, each with the number of tests and the environment at that time."
         done = Table(("time", "tests", "at", "what the user did"), _cut(rows, MOST, 3), {1, 2})
         blocks += [say(f"{count(len(rows), 'decision')} {lead}"), done]

@@ -52,15 +52,25 @@ def _models(record: Record) -> list[Block]:
     by_name = {each.model.name: each for each in record.models}
     drawn = [by_name.get(name) for name in names]
     columns: dict[str, list[Cell]] = {
-        "model": [(Name(name), " (pinned)") if name in state.pinned else Name(name) for name in names],
-        "kind": ["" if each is None else "static" if each.model.static else "dynamic" for each in drawn],
+        "model": [
+            (Name(name), " (pinned)") if name in state.pinned else Name(name) for name in names
+        ],
+        "kind": [
+            "" if each is None else "static" if each.model.static else "dynamic" for each in drawn
+        ],
         "centre x, y, z, m": ["" if each is None else coordinates(each.center) for each in drawn],
         "size x × y × z, m": ["" if each is None else _size(each) for each in drawn],
     }
     # In the last similar run, s; old files do not say it.
     test = state.evidence_test
-    if test is not None and 0 < test <= len(state.tests) and (first := dict(state.test(test).first_touched)):
-        columns["first touched, s"] = [f"{first[name]:.1f}" if name in first else "never" for name in names]
+    if (
+        test is not None
+        and 0 < test <= len(state.tests)
+        and (first := dict(state.test(test).first_touched))
+    ):
+        columns["first touched, s"] = [
+            f"{first[name]:.1f}" if name in first else "never" for name in names
+        ]
     right = range(2, len(columns))
     carried = [drops_without(state, frozenset({name})) for name in names]
     if any(carried):
@@ -89,13 +99,25 @@ def why(record: Record) -> Section | None:
         blocks.append(say(plain(f"{sentence(reason)} {parting_sentence(reason)}".rstrip())))
         if record.models and number < MOST_MAPS and reason.parting is not None:
             words = f"The world from above without {reason.without}: the robot's paths with it and without it"
-            blocks.append(_map(record, record.kept, reason.gone, reason.parting, f"why{number}", words, None))
+            blocks.append(
+                _map(record, record.kept, reason.gone, reason.parting, f"why{number}", words, None)
+            )
     if (passes := record.nearest) is not None:
         blocks.append(say(plain(passes.sentences)))
         if record.models and passes.parting is not None:
             without = f"the robot's path with {first_of(passes.gone, 3)} and without"
             words = f"The nearest world that passes, from above: {without}"
-            blocks.append(_map(record, record.elements, passes.gone, passes.parting, "nearest", words, passes.gone))
+            blocks.append(
+                _map(
+                    record,
+                    record.elements,
+                    passes.gone,
+                    passes.parting,
+                    "nearest",
+                    words,
+                    passes.gone,
+                )
+            )
     return Section("Why it fails", tuple(blocks)) if blocks else None
 
 
@@ -119,9 +141,13 @@ def _limits(record: Record) -> tuple[Block, Block]:
     if compared:
         one, parting = min(compared, key=lambda each: (each[0].verdict != "goal", each[0].share))
         ways = {"now": record.ways[parting.with_test], "changed": record.ways[parting.without_test]}
-        words += f" The robot's paths now and with {one.name} = {one.value:.4g}, seed {parting.seed}."
+        words += (
+            f" The robot's paths now and with {one.name} = {one.value:.4g}, seed {parting.seed}."
+        )
     limits = [limit for one in record.changes for limit in one.limits]
-    return say(plain(words)), Picture("margins", picture(record, "margins", ways, None, limits), plain(words))
+    return say(plain(words)), Picture(
+        "margins", picture(record, "margins", ways, None, limits), plain(words)
+    )
 
 
 def _map(

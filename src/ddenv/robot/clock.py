@@ -70,8 +70,14 @@ class Clock:
     @cached_property
     def ticks(self) -> tuple[Tick, ...]:
         """All steps at which something is due, from 0 to the last."""
-        steps = {step for every in self.every.values() for step in range(0, self.last, every)} | {self.last}
+        steps = {step for every in self.every.values() for step in range(0, self.last, every)} | {
+            self.last
+        }
         return tuple(
-            Tick(step, step * self.step, **{name: step % every == 0 for name, every in self.every.items()})
+            Tick(
+                step,
+                step * self.step,
+                **{name: step % every == 0 for name, every in self.every.items()},
+            )
             for step in sorted(steps)
         )

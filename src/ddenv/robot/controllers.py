@@ -32,7 +32,9 @@ BUILT_IN = {
     "straight": "ddenv.robot.navigation.navigate:Straight",
     "costmap": "ddenv.robot.navigation.navigate:Navigator",
 }
-LONGEST_IMPORT = 60.0  # the maximum time that an import may take, real s: some load whole frameworks
+LONGEST_IMPORT = (
+    60.0  # the maximum time that an import may take, real s: some load whole frameworks
+)
 
 Answer = TypeVar("Answer")
 # Modules loaded from the folder of the last user's controller; another folder may have modules of the same names.
@@ -50,18 +52,28 @@ def controllers(settings: Controller, folder: Path) -> Callable[[Setup], Drives]
     return partial(Guarded, make, folder=folder.resolve(), answer_within=settings.answer_within)
 
 
-def load(use: str, folder: Path, key: str = "controller.use", method: str = "step(reading)") -> Callable[[Any], Any]:
+def load(
+    use: str, folder: Path, key: str = "controller.use", method: str = "step(reading)"
+) -> Callable[[Any], Any]:
     """The class that `use` names: `straight`, `costmap`, or `module:Class` with the module in `folder` or installed.
 
     Raises UserError, which names the scenario's `key`, if there is no such class with this `method`, or if its module cannot be
     imported.
     """
     name, _, attribute = BUILT_IN.get(use, use).partition(":")
-    module = importlib.import_module(name) if use in BUILT_IN else _import(name, folder.resolve(), key)
+    module = (
+        importlib.import_module(name) if use in BUILT_IN else _import(name, folder.resolve(), key)
+    )
     found = getattr(module, attribute, None)
     if not callable(found):
-        classes = [each for each, value in vars(module).items() if isinstance(value, type) and each[0] != "_"]
-        raise UserError(f"{key}: module '{name}' has no class '{attribute}'{nearest(attribute, classes)}")
+        classes = [
+            each
+            for each, value in vars(module).items()
+            if isinstance(value, type) and each[0] != "_"
+        ]
+        raise UserError(
+            f"{key}: module '{name}' has no class '{attribute}'{nearest(attribute, classes)}"
+        )
     if isinstance(found, type) and not callable(getattr(found, method.partition("(")[0], None)):
         raise UserError(f"{key}: class '{attribute}' of module '{name}' has no method {method}")
     return cast(Callable[[Any], Any], found)
@@ -74,8 +86,14 @@ def _import(name: str, folder: Path, key: str) -> ModuleType:
     top = name.partition(".")[0]
     if _has(folder, top):
         loaded = sys.modules.get(top)
-        places = [] if loaded is None else [getattr(loaded, "__file__", None), *getattr(loaded, "__path__", ())]
-        elsewhere = loaded is not None and not any(place and Path(place).is_relative_to(folder) for place in places)
+        places = (
+            []
+            if loaded is None
+            else [getattr(loaded, "__file__", None), *getattr(loaded, "__path__", ())]
+        )
+        elsewhere = loaded is not None and not any(
+            place and Path(place).is_relative_to(folder) for place in places
+        )
         if elsewhere or top in sys.stdlib_module_names:
             raise UserError(f"{key}: '{top}' in {folder} has the name of another module; rename it")
     before = set(sys.modules)
@@ -86,15 +104,25 @@ def _import(name: str, folder: Path, key: str) -> ModuleType:
             call_within(LONGEST_IMPORT, __import__, name)
             return sys.modules[name]
     except TooLate:
-        raise UserError(f"{key}: importing '{name}' took longer than {LONGEST_IMPORT:g} s") from None
+        raise UserError(
+            f"{key}: importing '{name}' took longer than {LONGEST_IMPORT:g} s"
+        ) from None
     # A module may also exit, or interrupt itself.
     except BaseException as error:
-        if isinstance(error, ModuleNotFoundError) and error.name and f"{name}.".startswith(f"{error.name}."):
+        if (
+            isinstance(error, ModuleNotFoundError)
+            and error.name
+            and f"{name}.".startswith(f"{error.name}.")
+        ):
             hint = nearest(name, [file.stem for file in folder.glob("*.py")])
-            raise UserError(f"{key}: there is no module '{name}' in {folder}, nor installed{hint}") from None
+            raise UserError(
+                f"{key}: there is no module '{name}' in {folder}, nor installed{hint}"
+            ) from None
         raise UserError(f"{key}: importing '{name}' raised {described(error)}") from None
     finally:
-        _brought.update(each for each in set(sys.modules) - before if _has(folder, each.partition(".")[0]))
+        _brought.update(
+            each for each in set(sys.modules) - before if _has(folder, each.partition(".")[0])
+        )
 
 
 def _has(folder: Path, top: str) -> bool:
@@ -125,7 +153,9 @@ class BadCode(UserError):
 
     def __init__(self, reason: str) -> None:
         line = plain(reason)
-        super().__init__(line if len(line) <= LONGEST_REASON else f"{line[: LONGEST_REASON - 3]}...")
+        super().__init__(
+            line if len(line) <= LONGEST_REASON else f"{line[: LONGEST_REASON - 3]}..."
+        )
 
 
 class Guarded:
@@ -135,7 +165,9 @@ class Guarded:
     first, like its own. What it prints goes to stderr: a program may read stdout.
     """
 
-    def __init__(self, make: Callable[[Setup], Any], setup: Setup, folder: Path, answer_within: float) -> None:
+    def __init__(
+        self, make: Callable[[Setup], Any], setup: Setup, folder: Path, answer_within: float
+    ) -> None:
         self._name = getattr(make, "__qualname__", type(make).__name__)
         self._make = make
         # A copy: changes of the options must not reach the next run.
@@ -165,7 +197,9 @@ class Guarded:
         who = f"controller {self._name}: {what}"
         limit = f"{self._seconds:g} s (controller.answer_within)"
         with redirect_stdout(sys.stderr):
-            return guarded(who, lambda: call_within(self._seconds, call, given), self._folder, limit)
+            return guarded(
+                who, lambda: call_within(self._seconds, call, given), self._folder, limit
+            )
 
 
 class WrongAnswer(Exception):
@@ -198,11 +232,15 @@ def _command(answer: Any, joints: tuple[str, ...]) -> Twist | WheelSpeeds:
         return Twist(_number(answer[0], "a speed"), _number(answer[1], "a turn rate"))
     speeds = answer.speeds if isinstance(answer, WheelSpeeds) else answer
     if not isinstance(speeds, Mapping):
-        raise WrongAnswer(f"returned {_kind(answer)}; expected Twist(speed, turn_rate) or WheelSpeeds(speeds by joint)")
+        raise WrongAnswer(
+            f"returned {_kind(answer)}; expected Twist(speed, turn_rate) or WheelSpeeds(speeds by joint)"
+        )
     for joint in speeds:
         if not isinstance(joint, str) or joint not in joints:
             shown = str(joint)[:80]
-            raise WrongAnswer(f"returned a speed for '{shown}'{nearest(shown, joints)}; wheels are {', '.join(joints)}")
+            raise WrongAnswer(
+                f"returned a speed for '{shown}'{nearest(shown, joints)}; wheels are {', '.join(joints)}"
+            )
     return WheelSpeeds({joint: _number(speed, f"'{joint}'") for joint, speed in speeds.items()})
 
 
@@ -228,7 +266,11 @@ def described(error: BaseException) -> str:
     with suppress(Exception):
         text = str(error)
     files = [(Path(each.f_code.co_filename), line) for each, line in walk_tb(error.__traceback__)]
-    theirs = [each for each in files if not each[0].is_relative_to(OURS) and not str(each[0]).startswith("<")]
+    theirs = [
+        each
+        for each in files
+        if not each[0].is_relative_to(OURS) and not str(each[0]).startswith("<")
+    ]
     for file, line in theirs:
         if file.is_relative_to(theirs[0][0].parent):
             place = f" ({file.name}:{line})"

@@ -41,7 +41,11 @@ def kind_of(trajectory: Floats, fell: bool, arrived: float | None) -> str:
     times = trajectory[:, 0]
     heights = trajectory[:, 3]
     before = np.searchsorted(times, times - DROP_SECONDS - 1e-9)
-    fallen = (heights[before] - heights > DROP) & (times[before] >= SETTLING) & (heights[before] - heights[-1] > DROP)
+    fallen = (
+        (heights[before] - heights > DROP)
+        & (times[before] >= SETTLING)
+        & (heights[before] - heights[-1] > DROP)
+    )
     if fell or fallen.any():
         return "fell"
     (w, x, y, z), (ew, ex, ey, ez) = (trajectory[row, 4:].tolist() for row in (0, -1))
@@ -50,7 +54,9 @@ def kind_of(trajectory: Floats, fell: bool, arrived: float | None) -> str:
     up = end.rotate(start.inverse().rotate((0.0, 0.0, 1.0)))
     if math.acos(max(-1.0, min(1.0, up[2]))) > LEAN:
         return "tipped over"
-    if arrived is not None and not _is_still(trajectory[trajectory[:, 0] <= max(arrived, trajectory[0, 0])]):
+    if arrived is not None and not _is_still(
+        trajectory[trajectory[:, 0] <= max(arrived, trajectory[0, 0])]
+    ):
         return "lost"
     return "stuck" if _is_still(trajectory) else "out of time"
 
@@ -109,5 +115,8 @@ def judge_trajectory(trajectory: Floats, failure: Failure) -> Judgement:
 def trajectory_distance(a: Floats, b: Floats) -> float:
     """The mean distance of two trajectories (N, 8) at equal times, m. A shorter one, of a run that was cut, waits at its end."""
     times = np.union1d(a[:, 0], b[:, 0])
-    gaps = [np.interp(times, a[:, 0], a[:, axis]) - np.interp(times, b[:, 0], b[:, axis]) for axis in (1, 2, 3)]
+    gaps = [
+        np.interp(times, a[:, 0], a[:, axis]) - np.interp(times, b[:, 0], b[:, axis])
+        for axis in (1, 2, 3)
+    ]
     return float(np.linalg.norm(gaps, axis=0).mean())

@@ -73,7 +73,9 @@ class Scan:
         ranges = self.ranges[met]
         angles = self.angles[met]
         x, y, z = self.origin
-        return np.column_stack([x + ranges * np.cos(angles), y + ranges * np.sin(angles), np.full(len(ranges), z)])
+        return np.column_stack(
+            [x + ranges * np.cos(angles), y + ranges * np.sin(angles), np.full(len(ranges), z)]
+        )
 
 
 class Reading(NamedTuple):

@@ -75,7 +75,11 @@ class Simulator(Protocol):
     """Runs the robot in parts of one world."""
 
     def run(
-        self, keep: frozenset[str], seed: int, progress: Progress | None = None, ends: Ends | None = None
+        self,
+        keep: frozenset[str],
+        seed: int,
+        progress: Progress | None = None,
+        ends: Ends | None = None,
     ) -> RunResult:
         """Runs the robot in the world with the models `keep`, and with those that always stay.
 

@@ -36,7 +36,10 @@ def moved(world: World, settled: Settled) -> dict[str, float]:
     starts = link_poses(world)
     gone = frozenset(settled.fallen)
     return {
-        name: max(math.dist(one.position, there.position) for one, there in zip(starts[name], places, strict=True))
+        name: max(
+            math.dist(one.position, there.position)
+            for one, there in zip(starts[name], places, strict=True)
+        )
         for name, places in settled.places.items()
         if name not in gone
     }
@@ -53,7 +56,13 @@ def notes_on(world: World, settled: Settled) -> Iterator[tuple[str, str]]:
             f"{farthest} by {ways[farthest]:.2f} m; 'ddenv world settle' writes the world at rest",
         )
     for about, names, does, do, why in (
-        ("restless", settled.restless, "does", "do", f"not come to rest within {settled.seconds:.1f} s"),
+        (
+            "restless",
+            settled.restless,
+            "does",
+            "do",
+            f"not come to rest within {settled.seconds:.1f} s",
+        ),
         ("fallen", settled.fallen, "falls", "fall", "out of the world"),
         ("broken", settled.broken, "cannot", "cannot", "be simulated: their motion diverges"),
     ):

@@ -37,7 +37,10 @@ def rows(nodes: Sequence[Node], here: int) -> list[Row]:
         found.append(Row(f"{before}{fork}", nodes[number]))
         after = before + ("│ " if fork else "")
         # What goes straight down: the child on the path to the current node, or else the latest.
-        straight = next((child for child in children[number] if child in straight_path), (children[number] or [0])[-1])
+        straight = next(
+            (child for child in children[number] if child in straight_path),
+            (children[number] or [0])[-1],
+        )
         # The first side branch goes on top of the stack: it is drawn above those made later.
         ordered = [straight, *(child for child in reversed(children[number]) if child != straight)]
         todo += [(child, after, "├─" if child != straight else "") for child in ordered if child]

@@ -11,7 +11,18 @@ from typing import Annotated, dataclass_transform
 
 from ddenv.environment import NOTHING
 from ddenv.runfile.deeds import named
-from ddenv.runfile.reading import Models, Natural, Number, OneOf, Part, Pose, Positive, Real, Seconds, Share
+from ddenv.runfile.reading import (
+    Models,
+    Natural,
+    Number,
+    OneOf,
+    Part,
+    Pose,
+    Positive,
+    Real,
+    Seconds,
+    Share,
+)
 from ddenv.text import Data, Names, snake_case
 
 Pair = tuple[Natural, Natural]
@@ -264,7 +275,11 @@ class BaselineFinished(Event):
     @property
     def others(self) -> tuple[tuple[int, SeenFailure], ...]:
         """The failures that are not f, each with its number."""
-        return tuple((number, one) for number, one in enumerate(self.seen, 1) if one.test != self.failure_test)
+        return tuple(
+            (number, one)
+            for number, one in enumerate(self.seen, 1)
+            if one.test != self.failure_test
+        )
 
 
 # The search.
@@ -289,7 +304,9 @@ class RoundStarted(Event):
     n_partitions: Natural
     environment: Natural
     partitions: tuple[tuple[Natural, ...], ...]
-    candidates: tuple[tuple[Annotated[str, OneOf("partition", "complement")], Natural, Real | None], ...]
+    candidates: tuple[
+        tuple[Annotated[str, OneOf("partition", "complement")], Natural, Real | None], ...
+    ]
     pinned: Models = NOTHING
 
 
@@ -403,7 +420,18 @@ class ClaimMade:
     without: Natural | None
     environment: Natural
     verdict: Annotated[
-        str, OneOf("kept", "lost", "exact", "needed", "helps", "rarer", "not needed", "not shown", "unknown")
+        str,
+        OneOf(
+            "kept",
+            "lost",
+            "exact",
+            "needed",
+            "helps",
+            "rarer",
+            "not needed",
+            "not shown",
+            "unknown",
+        ),
     ]
     shown: Natural
     runs: Natural
@@ -493,7 +521,9 @@ class ReturnedMade:
     """A claim of a check: about a world that passes, or, if `back` is a model, about that with it put back."""
 
     back: Natural | None
-    verdict: Annotated[str, OneOf("passes", "fails", "needed", "not needed", "not shown", "unknown")]
+    verdict: Annotated[
+        str, OneOf("passes", "fails", "needed", "not needed", "not shown", "unknown")
+    ]
     reached: Natural
     runs: Natural
     low: Share

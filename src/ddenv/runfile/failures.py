@@ -54,7 +54,15 @@ def atlas(state: RunState) -> tuple[OtherFailure, ...]:
         for position, tests in _by_end(ends, epsilon):
             sizes = {test: len(state.environments[state.test(test).environment]) for test in tests}
             smallest = min(tests, key=lambda test: (sizes[test], test))
-            found.append(OtherFailure(kind=kind, position=position, tests=tuple(sorted(tests)), smallest=smallest, size=sizes[smallest]))
+            found.append(
+                OtherFailure(
+                    kind=kind,
+                    position=position,
+                    tests=tuple(sorted(tests)),
+                    smallest=smallest,
+                    size=sizes[smallest],
+                )
+            )
     return tuple(sorted(found, key=lambda one: (-len(one.tests), one.tests)))
 
 

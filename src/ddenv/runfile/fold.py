@@ -37,8 +37,18 @@ def apply(state: RunState, recorded: Recorded) -> RunState:
     try:
         changes = _HANDLERS[type(event)](state, event, recorded.time)
         changes |= fold_tests.rested_upon(state, event)
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, RecursionError):
-        raise UserError(f"damaged run file: event {recorded.id} ({recorded.kind}) is invalid here") from None
+    except (
+        KeyError,
+        TypeError,
+        ValueError,
+        IndexError,
+        AttributeError,
+        OverflowError,
+        RecursionError,
+    ):
+        raise UserError(
+            f"damaged run file: event {recorded.id} ({recorded.kind}) is invalid here"
+        ) from None
     if recorded.command is not None:
         changes["last_command"] = max(state.last_command, recorded.command)
         if isinstance(event, e.CommandRefused):
@@ -54,7 +64,9 @@ def apply(state: RunState, recorded: Recorded) -> RunState:
     return after
 
 
-def steps(events: Iterable[Recorded], state: RunState | None = None) -> Iterator[tuple[Recorded, RunState, RunState]]:
+def steps(
+    events: Iterable[Recorded], state: RunState | None = None
+) -> Iterator[tuple[Recorded, RunState, RunState]]:
     """(event, before, after) for each event, from the beginning or from an earlier `state`. Raises UserError at an invalid one."""
     after = state or RunState()
     for recorded in events:
@@ -66,7 +78,11 @@ def steps(events: Iterable[Recorded], state: RunState | None = None) -> Iterator
 def recorded_scenario(scenario: Data) -> Data:
     """A scenario as a run file has it: where it does not say so, seeds were consecutive."""
     reduction = scenario.get("reduction")
-    return scenario | {"reduction": {"seeds": "consecutive"} | reduction} if isinstance(reduction, dict) else scenario
+    return (
+        scenario | {"reduction": {"seeds": "consecutive"} | reduction}
+        if isinstance(reduction, dict)
+        else scenario
+    )
 
 
 def created(state: RunState, event: e.Created, _: float) -> Changes:
@@ -80,7 +96,9 @@ def created(state: RunState, event: e.Created, _: float) -> Changes:
         "environments": PersistentTuple.of([Environment.whole(len(names))]),
         "environment": names,
         "history": (Point(0, len(names)),),
-        "nodes": (Node(number=0, parent=None, how="start", what="the whole world", environment=names),),
+        "nodes": (
+            Node(number=0, parent=None, how="start", what="the whole world", environment=names),
+        ),
     }
 
 
@@ -117,7 +135,13 @@ def compared(state: RunState, event: e.Compared, _: float) -> Changes:
 
 
 def _ended(state: RunState, status: str, reason: str, at: float) -> Changes:
-    return {**_stopped(state, at), "status": status, "reason": reason, "waiting_candidate": None, "paused": False}
+    return {
+        **_stopped(state, at),
+        "status": status,
+        "reason": reason,
+        "waiting_candidate": None,
+        "paused": False,
+    }
 
 
 def engine_stopped(state: RunState, event: e.EngineStopped, at: float) -> Changes:
@@ -160,7 +184,11 @@ def _stopped(state: RunState, at: float) -> Changes:
 
 def clock_jumped(state: RunState, event: e.ClockJumped, at: float) -> Changes:
     """Nobody worked in that time."""
-    return {} if state.started_at is None else {"started_at": min(at, state.started_at + event.seconds)}
+    return (
+        {}
+        if state.started_at is None
+        else {"started_at": min(at, state.started_at + event.seconds)}
+    )
 
 
 def _stands(state: RunState) -> bool:
@@ -190,16 +218,24 @@ def environment_named(state: RunState, event: e.EnvironmentNamed, _: float) -> C
 def round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
     whole = state.environments[event.environment]
     # The bits of a model that is not there could fill the memory.
-    if max((model for part in event.partitions for model in part), default=0) >= len(state.elements):
+    if max((model for part in event.partitions for model in part), default=0) >= len(
+        state.elements
+    ):
         raise ValueError("partitions")
     parts = tuple(map(Environment.of, event.partitions))
     together = event.pinned
     for part in parts:
         together |= part
-    if len(together) != sum(map(len, event.partitions)) + len(event.pinned) or not together <= whole or not all(parts):
+    if (
+        len(together) != sum(map(len, event.partitions)) + len(event.pinned)
+        or not together <= whole
+        or not all(parts)
+    ):
         raise ValueError("partitions")
     asked = {(kind, partition) for kind, partition, _ in event.candidates}
-    if len(asked) != len(event.candidates) or any(partition >= len(parts) for _, partition in asked):
+    if len(asked) != len(event.candidates) or any(
+        partition >= len(parts) for _, partition in asked
+    ):
         raise ValueError("candidates")
     if state.round is not None and event.round <= state.round.number:
         raise ValueError(event.round)
@@ -211,13 +247,23 @@ def round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
     letters = tuple(had[part] if part in had else next(free) for part in parts)
     names = tuple(tuple(map(state.elements.__getitem__, part)) for part in event.partitions)
     always = event.pinned.names(state.elements)
-    split = Split(environment=whole.names(state.elements), partitions=names, pinned=always, whole=whole, parts=parts, always=event.pinned, letters=letters)
+    split = Split(
+        environment=whole.names(state.elements),
+        partitions=names,
+        pinned=always,
+        whole=whole,
+        parts=parts,
+        always=event.pinned,
+        letters=letters,
+    )
     candidates = PersistentTuple.of(
         Candidate(index=index, kind=kind, partition=partition, split=split, distance=distance)
         for index, (kind, partition, distance) in enumerate(event.candidates)
     )
     here = replace(state.nodes[state.node], n_partitions=event.n_partitions)
-    round = Round(number=event.round, n_partitions=event.n_partitions, split=split, candidates=candidates)
+    round = Round(
+        number=event.round, n_partitions=event.n_partitions, split=split, candidates=candidates
+    )
     return {**waits_no_more(state), "round": round, "nodes": with_node(state.nodes, here)}
 
 
@@ -230,7 +276,11 @@ def forecast(state: RunState, event: e.Forecast, _: float) -> Changes:
         done = event.tests_done - state.forecast.tests_done
         low = max(low, state.forecast.tests[0] - done)
         high = min(high, state.forecast.tests[2] - done)
-    return {"forecast": event if low > high else replace(event, tests=(low, min(max(low, likely), high), high))}
+    return {
+        "forecast": event
+        if low > high
+        else replace(event, tests=(low, min(max(low, likely), high), high))
+    }
 
 
 def candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Changes:
@@ -242,7 +292,9 @@ def candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Cha
         return changes
     # Something in the part that it leaves out is needed, and these parts are disjoint.
     round: Round = changes["round"]
-    round = replace(round, missed=round.missed + (candidate.kind == "complement" or len(round.partitions) == 2))
+    round = replace(
+        round, missed=round.missed + (candidate.kind == "complement" or len(round.partitions) == 2)
+    )
     changes["round"] = round
     needed = min(max(state.lower_bound, round.missed, 1), len(round.environment))
     if needed != state.lower_bound:
@@ -260,11 +312,19 @@ def decided(state: RunState, event: e.Decided, at: float) -> Changes:
     accepts = event.decision == "accept"
     words = f"{'accepted' if accepts else 'rejected'} {_described(state, candidate)}"
     status = "paused" if state.paused else "running"
-    changes = {"status": status, "waiting_candidate": None, **decision(state, at, event.decision, words)}
+    changes = {
+        "status": status,
+        "waiting_candidate": None,
+        **decision(state, at, event.decision, words),
+    }
     if accepts:
         return changes | {"round": replace(current(state), accepted=candidate.index)}
     rejected = replace(candidate, verdict="rejected")
-    return {**changes, **with_candidate(state, rejected), **refused(state, candidate.kept, "rejected", event.round)}
+    return {
+        **changes,
+        **with_candidate(state, rejected),
+        **refused(state, candidate.kept, "rejected", event.round),
+    }
 
 
 def reduced(state: RunState, event: e.Reduced, at: float) -> Changes:
@@ -273,7 +333,9 @@ def reduced(state: RunState, event: e.Reduced, at: float) -> Changes:
     # One part alone shows f although several seemed to be needed: the lower bound was wrong.
     if winner.kind == "partition" and round.missed > 1:
         state = state.changed(lower_bound=0)
-    changes = arrived(state, event.environment, event.evidence_test, at, "reduced", winner.label, winner.tests)
+    changes = arrived(
+        state, event.environment, event.evidence_test, at, "reduced", winner.label, winner.tests
+    )
     return changes | {"round": replace(round, winner=winner.index)}
 
 
@@ -289,7 +351,13 @@ def round_finished(state: RunState, event: e.RoundFinished, _: float) -> Changes
         judged = [one for one in round.candidates[:last] if one.verdict in JUDGED]
         tests = tuple(dict.fromkeys(test for one in judged for test in one.tests))
         unknown = tuple(one.index for one in judged if one.verdict == "unknown")
-        past = PastRound(digest=digest(round.split.parts), winner=round.winner, evidence_test=evidence, tests=tests, unknown=unknown)
+        past = PastRound(
+            digest=digest(round.split.parts),
+            winner=round.winner,
+            evidence_test=evidence,
+            tests=tests,
+            unknown=unknown,
+        )
         changes["leg"] = replace(state.leg, past=(*state.leg.past, past))
     return changes
 
@@ -302,14 +370,25 @@ def digest(parts: Iterable[Environment]) -> int:
 def accept_mode_changed(state: RunState, event: e.AcceptModeChanged, at: float) -> Changes:
     if event.mode == state.accept_mode:
         return {}
-    words = "reductions wait for accept or reject" if event.mode == "ask" else "reductions are accepted automatically"
+    words = (
+        "reductions wait for accept or reject"
+        if event.mode == "ask"
+        else "reductions are accepted automatically"
+    )
     return {"accept_mode": event.mode, **decision(state, at, "accept_mode", words)}
 
 
 def vetoed(state: RunState, event: e.Vetoed, at: float) -> Changes:
     candidate = replace(tried(state, event), verdict=event.verdict)
-    changes = {**with_candidate(state, candidate), **refused(state, candidate.kept, event.verdict, event.round)}
-    return changes if event.again else changes | decision(state, at, "veto", f"vetoed {_described(state, candidate)}")
+    changes = {
+        **with_candidate(state, candidate),
+        **refused(state, candidate.kept, event.verdict, event.round),
+    }
+    return (
+        changes
+        if event.again
+        else changes | decision(state, at, "veto", f"vetoed {_described(state, candidate)}")
+    )
 
 
 def unvetoed(state: RunState, event: e.Unvetoed, at: float) -> Changes:
@@ -353,8 +432,12 @@ _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
     e.SupportsStarted: lambda *_: {"settling": True},
     e.Still: lambda *_: {"ties": ()},
     e.Noted: lambda state, event, _: {"notes": (*state.notes, (event.about, event.words))},
-    e.IsolationFinished: lambda state, event, at: fold_claims.isolation_found(state, event) | _as_it_was(state, at),
-    e.IsolationGivenUp: lambda state, _, at: _as_it_was(state, at) | {"isolations": fold_decisions.without_open(state)},
+    e.IsolationFinished: lambda state, event, at: (
+        fold_claims.isolation_found(state, event) | _as_it_was(state, at)
+    ),
+    e.IsolationGivenUp: lambda state, _, at: (
+        _as_it_was(state, at) | {"isolations": fold_decisions.without_open(state)}
+    ),
     e.MarginImpossible: fold_claims.margin_ran,
     e.MarginsFinished: lambda state, _, at: (
         _as_it_was(state, at) | {"margins": replace(fold_claims.open_margins(state), ended=True)}

@@ -6,9 +6,26 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ddenv.runfile import events as e
-from ddenv.runfile.fold_decisions import arrived, at_node, decision, listed, origin, searched_anew, without_open
+from ddenv.runfile.fold_decisions import (
+    arrived,
+    at_node,
+    decision,
+    listed,
+    origin,
+    searched_anew,
+    without_open,
+)
 from ddenv.runfile.fold_tests import Changes, shared, with_node, with_removal, with_test
-from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Margins, Node, NumberTried, Returned
+from ddenv.runfile.progress import (
+    Certificate,
+    Check,
+    Claim,
+    Isolation,
+    Margins,
+    Node,
+    NumberTried,
+    Returned,
+)
 from ddenv.runfile.state import OUTCOMES, PersistentTuple, RunState
 
 
@@ -31,14 +48,19 @@ def certificate_finished(state: RunState, event: e.CertificateFinished, _: float
     _check_tests(state, event.tests)
     claims = []
     for made in event.claims:
-        known = made.environment < len(state.environments) and all(outcome in OUTCOMES for outcome in made.outcomes)
+        known = made.environment < len(state.environments) and all(
+            outcome in OUTCOMES for outcome in made.outcomes
+        )
         if not known or made.shown > made.runs or (made.verdict == "lost" and not made.runs):
             raise ValueError(made)
         special = {"without": _name(state, made.without), "outcomes": tuple(made.outcomes.items())}
         claims.append(Claim(**shared(made, Claim) | special))
     last = replace(state.certificates[-1], claims=tuple(claims), elsewhere=event.elsewhere)
     unknown = any(claim.verdict == "unknown" for claim in claims)
-    return {"certificates": (*state.certificates[:-1], last), "left_unknown": state.left_unknown or unknown}
+    return {
+        "certificates": (*state.certificates[:-1], last),
+        "left_unknown": state.left_unknown or unknown,
+    }
 
 
 def _name(state: RunState, model: int | None) -> str | None:
@@ -72,7 +94,11 @@ def left_out(state: RunState, event: e.LeftOut, at: float) -> Changes:
     runs = [test.id for test in state.confirm_tests if test.environment == event.environment]
     what = f"without {listed([without])}"
     how = "left_out" if event.by_user else "certified"
-    said = decision(state, at, "leave_out", f"left out {listed([without])}, which only helped") if event.by_user else {}
+    said = (
+        decision(state, at, "leave_out", f"left out {listed([without])}, which only helped")
+        if event.by_user
+        else {}
+    )
     return arrived(state, event.environment, event.evidence_test, at, how, what, runs) | said
 
 
@@ -105,7 +131,10 @@ def isolation_checked(state: RunState, event: e.IsolationChecked, _: float) -> C
     check = Check(number, tuple(claims))
     if not check.claims or check.claims[0].back is not None:
         raise ValueError(event)
-    return {"removals": removals, "isolations": (*state.isolations[:-1], replace(last, checks=(*last.checks, check)))}
+    return {
+        "removals": removals,
+        "isolations": (*state.isolations[:-1], replace(last, checks=(*last.checks, check))),
+    }
 
 
 def isolation_found(state: RunState, event: e.IsolationFinished) -> Changes:
@@ -127,16 +156,31 @@ def margins_started(state: RunState, event: e.MarginsStarted, _: float) -> Chang
     """Numbers that were asked for before keep their runs, as long as they are about the same models."""
     names = tuple(asked.name for asked in event.numbers)
     sound = all(one.low <= one.now <= one.high and one.low < one.high for one in event.numbers)
-    if not names or len(set(names)) != len(names) or not sound or not event.rate or state.baseline is None:
+    if (
+        not names
+        or len(set(names)) != len(names)
+        or not sound
+        or not event.rate
+        or state.baseline is None
+    ):
         raise ValueError(names)
     if event.environment >= len(state.environments):
         raise ValueError(event.environment)
     asked = tuple(NumberTried(one, event.rate, event.error) for one in event.numbers)
     last = state.margins
     if last is None or last.asked.environment != event.environment:
-        return {"margins": Margins(asked=event, numbers=asked, earlier=0 if last is None else last.made)}
+        return {
+            "margins": Margins(asked=event, numbers=asked, earlier=0 if last is None else last.made)
+        }
     numbers = (*(one for one in last.numbers if one.asked.name not in names), *asked)
-    now = replace(last, asked=event, numbers=numbers, before_call=len(last.runs), ended=False, broken_off=False)
+    now = replace(
+        last,
+        asked=event,
+        numbers=numbers,
+        before_call=len(last.runs),
+        ended=False,
+        broken_off=False,
+    )
     return {"margins": now}
 
 
@@ -164,7 +208,9 @@ def sliced(state: RunState, event: e.Sliced, at: float) -> Changes:
         raise ValueError(event.tests)
     changes = arrived(state, event.environment, event.evidence_test, at, "sliced", "the slice", ())
     *others, last = changes["nodes"]
-    return changes | {"nodes": (*others, replace(last, sliced_by=event.tests, to_audit=event.audit))}
+    return changes | {
+        "nodes": (*others, replace(last, sliced_by=event.tests, to_audit=event.audit))
+    }
 
 
 def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes:

@@ -50,7 +50,11 @@ def trial_started(state: RunState, event: e.TrialStarted, at: float) -> Changes:
         raise ValueError(trial.number)
     inside = frozenset(names)
     without = [name for name in state.environment if name not in inside]
-    what = f"without {listed(without)}" if 0 < len(without) <= trial.size else f"with {listed(names)} alone"
+    what = (
+        f"without {listed(without)}"
+        if 0 < len(without) <= trial.size
+        else f"with {listed(names)} alone"
+    )
     words = f"tried {trial.size} of {len(state.environment)} models ({trial.label}): {what}"
     return {"trials": (*state.trials, trial), **decision(state, at, "try", words)}
 
@@ -58,13 +62,17 @@ def trial_started(state: RunState, event: e.TrialStarted, at: float) -> Changes:
 def trial_judged(state: RunState, event: e.TrialJudged, _: float) -> Changes:
     trial = state.trials[event.trial - 1]
     judged = replace(trial, verdict=event.verdict, tests=event.tests)
-    return with_trial(state, judged) | {"left_unknown": state.left_unknown or event.verdict == "unknown"}
+    return with_trial(state, judged) | {
+        "left_unknown": state.left_unknown or event.verdict == "unknown"
+    }
 
 
 def adopted(state: RunState, event: e.Adopted, at: float) -> Changes:
     trial = replace(state.trials[event.trial - 1], adopted=True)
     said = decision(state, at, "adopt", f"adopted {trial.label}: {count(trial.size, 'model')}")
-    there = arrived(state, event.environment, event.evidence_test, at, "adopted", trial.label, trial.tests)
+    there = arrived(
+        state, event.environment, event.evidence_test, at, "adopted", trial.label, trial.tests
+    )
     return with_trial(state, trial) | there | said
 
 
@@ -79,7 +87,9 @@ def accepted_other(state: RunState, event: e.AcceptedOther, at: float) -> Change
     runs = same_runs(judged, test)
     if event.instead:
         # In place of what was f, in a branch.
-        changes |= arrived(judged, event.environment, test.id, at, "instead", what, runs, below=test.node)
+        changes |= arrived(
+            judged, event.environment, test.id, at, "instead", what, runs, below=test.node
+        )
         gone = state.pinned.difference(changes["environment"])
         changes |= {"failures": (test.id,), "pinned": state.pinned - gone}
         words = f"branched to another failure, now f: {what}{_unpinned(state, gone)}"
@@ -102,7 +112,9 @@ def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
     wanted = state.environments[node.id]
     changes: Changes = {
         "refused": tuple(refusal for refusal in state.refused if refusal.environment != wanted),
-        "lost": tuple(one for one in state.lost if one[0] != state.failures or not wanted <= one[1]),
+        "lost": tuple(
+            one for one in state.lost if one[0] != state.failures or not wanted <= one[1]
+        ),
     }
     state = state.changed(**changes)
     nodes = with_node(state.nodes, replace(node, rejected=False, lost_rate=False))
@@ -133,8 +145,12 @@ def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
 
 
 def changed(state: RunState, event: e.Changed, at: float) -> Changes:
-    said = {key: [read(state.scenario, SETTINGS[key]), value] for key, value in event.settings.items()}
-    limits = {key: ["no limit" if one is None else one for one in both] for key, both in said.items()}
+    said = {
+        key: [read(state.scenario, SETTINGS[key]), value] for key, value in event.settings.items()
+    }
+    limits = {
+        key: ["no limit" if one is None else one for one in both] for key, both in said.items()
+    }
     words = ", ".join(f"{key} from {old} to {new}" for key, (old, new) in limits.items())
     changes: Changes = {"scenario": with_settings(state.scenario, event.settings)}
     changes |= decision(state, at, "change", f"changed {words}")
@@ -148,7 +164,8 @@ def with_settings(scenario: Data, new: Mapping[str, Any]) -> Data:
     """A scenario as plain data with new values of settings. Raises KeyError for a setting that there is not."""
     sections = {SETTINGS[name].section for name in new}
     return scenario | {
-        section: scenario[section] | {name: one for name, one in new.items() if SETTINGS[name].section == section}
+        section: scenario[section]
+        | {name: one for name, one in new.items() if SETTINGS[name].section == section}
         for section in sections
     }
 
@@ -214,7 +231,8 @@ def arrived(
         n_partitions=None if state.round is None else state.round.n_partitions,
         round=None if state.round is None else state.round.number,
         tests=state.tests_done,
-        own_tests=state.nodes[parent].own_tests + (state.tests_done - state.came_at) * (parent == state.node),
+        own_tests=state.nodes[parent].own_tests
+        + (state.tests_done - state.came_at) * (parent == state.node),
         time=at,
         evidence_test=evidence_test,
         method=f"{reduction.get('algorithm', '')} {reduction.get('pair', '')}".strip(),
@@ -223,7 +241,11 @@ def arrived(
     )
     inside = state.environments[number] <= state.environments[state.nodes[state.node].id]
     # Nothing is known yet about what another failure needs.
-    needed = min(state.lower_bound, len(environment)) if inside and how not in ("accepted", "instead") else 0
+    needed = (
+        min(state.lower_bound, len(environment))
+        if inside and how not in ("accepted", "instead")
+        else 0
+    )
     changes = {} if how == "reduced" else left_round(state) | {"search_due": True}
     return changes | at_node(state, node, needed) | {"nodes": (*state.nodes, node)}
 
@@ -243,7 +265,12 @@ def at_node(state: RunState, node: Node, needed: int = 0) -> Changes:
 
 def decision(state: RunState, at: float, kind: str, words: str) -> Changes:
     """One more decision of the user."""
-    return {"decisions": (*state.decisions, Decision(time=at, tests=state.tests_done, node=state.node, kind=kind, words=words))}
+    return {
+        "decisions": (
+            *state.decisions,
+            Decision(time=at, tests=state.tests_done, node=state.node, kind=kind, words=words),
+        )
+    }
 
 
 def refused(state: RunState, environment: Environment, verdict: str, round: int | None) -> Changes:
@@ -274,7 +301,9 @@ def exact_runs(state: RunState) -> Numbers:
     if asked.accept_rate != "exact":
         return ()
     tests = (test for test in rested_on(state) if test.environment == whole and test.shows_f)
-    return tuple(sorted({test.run for test in tests if test.run < FIRST_FRESH_RUN})[: asked.exact_seeds])
+    return tuple(
+        sorted({test.run for test in tests if test.run < FIRST_FRESH_RUN})[: asked.exact_seeds]
+    )
 
 
 def stands_for_all(state: RunState) -> bool:
@@ -294,7 +323,11 @@ def broken_runs(state: RunState) -> Numbers:
 def rested_on(state: RunState) -> tuple[Test, ...]:
     """The tests that decisions rest on, without those that only ran ahead of time."""
     began = state.baseline is not None
-    return tuple(test for test in state.tests if state.rests_on >> test.id & 1 or (began and test.phase == "baseline"))
+    return tuple(
+        test
+        for test in state.tests
+        if state.rests_on >> test.id & 1 or (began and test.phase == "baseline")
+    )
 
 
 def left_round(state: RunState) -> Changes:
@@ -304,7 +337,9 @@ def left_round(state: RunState) -> Changes:
         "confirming": False,
         "certificates": past,
         "isolations": without_open(state),
-        "margins": None if state.margins is None else replace(state.margins, broken_off=not state.margins.ended),
+        "margins": None
+        if state.margins is None
+        else replace(state.margins, broken_off=not state.margins.ended),
         "round": None if state.round is None else replace(state.round, done=True),
         **waits_no_more(state),
     }
@@ -313,13 +348,20 @@ def left_round(state: RunState) -> Changes:
 def without_open(state: RunState) -> tuple[Isolation, ...]:
     """All isolations; the one that is under way, if there is one, is broken off."""
     last = state.isolating
-    return state.isolations if last is None else (*state.isolations[:-1], replace(last, broken_off=True))
+    return (
+        state.isolations
+        if last is None
+        else (*state.isolations[:-1], replace(last, broken_off=True))
+    )
 
 
 def waits_no_more(state: RunState) -> Changes:
     """No reduction waits for the user any more."""
     working = "paused" if state.paused else "running"
-    return {"waiting_candidate": None, "status": working if state.status == "waiting" else state.status}
+    return {
+        "waiting_candidate": None,
+        "status": working if state.status == "waiting" else state.status,
+    }
 
 
 def searched_anew(state: RunState) -> Changes:
@@ -331,7 +373,11 @@ def searched_anew(state: RunState) -> Changes:
 def place(node: Node) -> str:
     """A node in words."""
     models = count(len(node.environment), "model")
-    return f"the whole world ({models})" if node.parent is None else f"{models} (#{node.number}, {plain(node.what)})"
+    return (
+        f"the whole world ({models})"
+        if node.parent is None
+        else f"{models} (#{node.number}, {plain(node.what)})"
+    )
 
 
 def listed(models: Sequence[str]) -> str:

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from ddenv.environment import Numbers
 from ddenv.runfile.progress import Node, Point, Removal
-from ddenv.runfile.state import CERTIFY, ISOLATE, Candidate, PersistentTuple, Round, RunState, Test, Trial
+from ddenv.runfile.state import (
+    CERTIFY,
+    ISOLATE,
+    Candidate,
+    PersistentTuple,
+    Round,
+    RunState,
+    Test,
+    Trial,
+)
 from ddenv.text import Data
 
 if TYPE_CHECKING:
@@ -30,7 +39,9 @@ def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) ->
         node = 0
     elif event.phase == CERTIFY and event.without is None:
         # Of a fresh run, that with its environment on the way to the current one.
-        node = next((one.number for one in reversed(state.path) if one.id == event.environment), node)
+        node = next(
+            (one.number for one in reversed(state.path) if one.id == event.environment), node
+        )
     special = {
         "id": event.test,
         "without": None if event.without is None else state.elements[event.without],
@@ -47,7 +58,9 @@ def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) ->
         "audits": state.audits + (test.audits is not None),
         **counts(state, None, test),
     }
-    if test.phase == CERTIFY and (not state.certificates or test.run >= state.certificates[-1].first_run):
+    if test.phase == CERTIFY and (
+        not state.certificates or test.run >= state.certificates[-1].first_run
+    ):
         changes["fresh"] = state.fresh.added(test.id)
     if event.trial is not None:
         trial = state.trials[event.trial - 1]
@@ -60,7 +73,11 @@ def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) ->
 
 def shared(event: Any, kind: type[Any]) -> Data:
     """The fields that a part of an event and the state have in common."""
-    return {field.name: getattr(event, field.name) for field in fields(kind) if hasattr(event, field.name)}
+    return {
+        field.name: getattr(event, field.name)
+        for field in fields(kind)
+        if hasattr(event, field.name)
+    }
 
 
 def with_removal(state: RunState, environment: int) -> tuple[PersistentTuple[Removal], int]:
@@ -110,19 +127,29 @@ def implied(state: RunState, event: e.Implied, at: float) -> Changes:
 
 def test_lost(state: RunState, event: e.TestLost, _: float) -> Changes:
     lost = state.test(event.test)
-    return with_test(state, event.test, {"outcome": "lost"}) | {"audits": state.audits - (lost.audits is not None)}
+    return with_test(state, event.test, {"outcome": "lost"}) | {
+        "audits": state.audits - (lost.audits is not None)
+    }
 
 
 def baseline_finished(state: RunState, event: e.BaselineFinished, _: float) -> Changes:
     changes = with_outcomes(state, event.judged)
     first = event.failure_test
     judged = state.changed(**changes)
-    rated = (test.id for test in judged.tests if test.phase == "baseline" and test.run >= event.chose)
+    rated = (
+        test.id for test in judged.tests if test.phase == "baseline" and test.run >= event.chose
+    )
     runs, shown = seen(judged.tests, rated)
     whole = replace(state.nodes[0], evidence_test=first, runs=runs, shown=shown)
     history = (*state.history, Point(judged.tests_done, len(state.environment)))
     status = state.status if state.paused else "running"
-    changes |= {"baseline": event, "evidence_test": first, "failures": (first,), "history": history, "status": status}
+    changes |= {
+        "baseline": event,
+        "evidence_test": first,
+        "failures": (first,),
+        "history": history,
+        "status": status,
+    }
     return changes | {"nodes": with_node(state.nodes, whole)}
 
 
@@ -154,7 +181,9 @@ def rested_upon(before: RunState, event: e.Event) -> Changes:
     """After a verdict decisions rest on its tests, whatever the number of workers."""
     from ddenv.runfile import events as e
 
-    if not isinstance(event, e.CandidateJudged | e.TrialJudged | e.CertificateFinished | e.RateLost):
+    if not isinstance(
+        event, e.CandidateJudged | e.TrialJudged | e.CertificateFinished | e.RateLost
+    ):
         return {}
     new = [test for test in dict.fromkeys(event.tests) if not before.rests_on >> test & 1]
     if any(not 0 < test <= len(before.tests) for test in new):
@@ -174,7 +203,12 @@ def _noted(state: RunState, test: Test) -> Changes:
         # Beside what is left, the whole world runs where that missed f, which would show its rate as too low.
         beside = test.node != state.node and state.nodes[test.node].how in ("start", "instead")
         node = None if beside or test.without is not None else state.nodes[test.node]
-    elif round is not None and here is not None and test.candidate is not None and test.round == round.number:
+    elif (
+        round is not None
+        and here is not None
+        and test.candidate is not None
+        and test.round == round.number
+    ):
         # It ran ahead of the verdict that made its candidate the environment.
         node = here if round.winner == test.candidate and here.round == round.number else None
     if node is None or not test.is_sound:
@@ -191,7 +225,9 @@ def same_runs(state: RunState, test: Test) -> Numbers:
 
 def seen(tests: Sequence[Test], ids: Iterable[int]) -> tuple[Numbers, int]:
     """Those of some tests that ended and did not break, each once, and how many of them showed f."""
-    sound = tuple(id for id in dict.fromkeys(ids) if 0 < id <= len(tests) and tests[id - 1].is_sound)
+    sound = tuple(
+        id for id in dict.fromkeys(ids) if 0 < id <= len(tests) and tests[id - 1].is_sound
+    )
     return sound, sum(tests[id - 1].shows_f for id in sound)
 
 
@@ -225,7 +261,9 @@ def candidate_of(state: RunState, number: int, index: int) -> Candidate:
 def with_candidate(state: RunState, candidate: Candidate) -> Changes:
     """The current round with `candidate` in place of the one with the same index."""
     round = current(state)
-    return {"round": replace(round, candidates=round.candidates.changed(candidate.index, candidate))}
+    return {
+        "round": replace(round, candidates=round.candidates.changed(candidate.index, candidate))
+    }
 
 
 def current(state: RunState) -> Round:

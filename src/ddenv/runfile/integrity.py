@@ -76,7 +76,9 @@ def rescue(file: RunFile, copy: Path) -> Whole:
     except UserError:
         first = None
     if first is None or not isinstance(first.event, Created):
-        raise UserError(f"{file.path}: nothing can be repaired: its first event, or its world and settings, are lost")
+        raise UserError(
+            f"{file.path}: nothing can be repaired: its first event, or its world and settings, are lost"
+        )
     try:
         with tempfile.TemporaryDirectory(prefix=f".{copy.name}.", dir=copy.parent) as folder:
             made = Path(folder) / copy.name
@@ -84,7 +86,9 @@ def rescue(file: RunFile, copy: Path) -> Whole:
             found = _fill(file, made)
             copy.hardlink_to(made)
     except (OSError, sqlite3.Error) as error:
-        raise UserError(f"{copy}: cannot be written: {getattr(error, 'strerror', None) or error}") from None
+        raise UserError(
+            f"{copy}: cannot be written: {getattr(error, 'strerror', None) or error}"
+        ) from None
     return found
 
 
@@ -107,4 +111,9 @@ def _fill(file: RunFile, made: Path) -> Whole:
 
 
 def _row(entry: Recorded | Request) -> tuple[int, float, str, str]:
-    return entry.id, entry.time, entry.kind, json.dumps(entry.data, allow_nan=False, separators=(",", ":"))
+    return (
+        entry.id,
+        entry.time,
+        entry.kind,
+        json.dumps(entry.data, allow_nan=False, separators=(",", ":")),
+    )

@@ -28,7 +28,10 @@ def _lock_path(run: Path) -> Path:
 @contextmanager
 def engine_lock(run: Path, taken: str = "") -> Iterator[None]:
     """Holds the run's lock. Raises UserError, with the words `taken` if there are any, if another engine holds it."""
-    taken = taken or f"{run}: another engine is working on this run; attach to it with 'ddenv open {run}'"
+    taken = (
+        taken
+        or f"{run}: another engine is working on this run; attach to it with 'ddenv open {run}'"
+    )
     refused = f"{run}: cannot run an engine here"
     instead = "copy the run to a folder on this machine that you can write to"
     with held(_lock_path(run), taken, refused, instead, mode_beside(run)):
@@ -47,7 +50,9 @@ def mode_beside(run: Path) -> int:
 def held(lock: Path, taken: str, refused: str, instead: str, mode: int = OWN) -> Iterator[None]:
     """Holds the file `lock`. Raises UserError: `taken` if another process holds it, `refused` if it cannot be made or locked."""
     if fcntl is None:
-        raise UserError(f"{refused}: this system has no file locks; use Linux or macOS, or WSL on Windows")
+        raise UserError(
+            f"{refused}: this system has no file locks; use Linux or macOS, or WSL on Windows"
+        )
     try:
         handle = os.open(lock, os.O_RDWR | os.O_CREAT, mode)
     except OSError as error:

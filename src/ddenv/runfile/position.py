@@ -70,7 +70,9 @@ class Position:
         self._ids = array("q", [0])
         # The events that started the tests, by the tests' ids less one.
         self._starts = array("q")
-        self._stops: dict[Step, array[int]] = {step: array("q") for step in get_args(Step) if step != "round"}
+        self._stops: dict[Step, array[int]] = {
+            step: array("q") for step in get_args(Step) if step != "round"
+        }
         # The moments between two kept states that were visited last.
         self._near: list[Moment] = []
 
@@ -89,7 +91,9 @@ class Position:
             self._stops["moment"].append(id)
         if kind in _VERDICTS or len(after.decisions) > len(before.decisions):
             self._stops["decision"].append(id)
-        if len(after.environment) < len(before.environment) and len(after.nodes) > len(before.nodes):
+        if len(after.environment) < len(before.environment) and len(after.nodes) > len(
+            before.nodes
+        ):
             self._stops["reduction"].append(id)
         self._add_to_chapter(kind, before, after)
 
@@ -206,5 +210,9 @@ def position_in(events: Sequence[Recorded]) -> Position:
 def _goes_on(chapter: Chapter, state: RunState) -> bool:
     """Whether the run is still in its last chapter: what a chapter showed is gone once the run goes elsewhere."""
     if chapter.kind == "round":
-        return state.round is not None and not state.round.done and state.round.number == chapter.number
+        return (
+            state.round is not None
+            and not state.round.done
+            and state.round.number == chapter.number
+        )
     return chapter.kind == "baseline" or state.certificate is not None

@@ -48,7 +48,9 @@ class Digits:
     def __get_pydantic_core_schema__(*_: Any) -> Any:
         from pydantic_core import core_schema
 
-        written = core_schema.plain_serializer_function_ser_schema(lambda environment: f"{environment.bits:x}")
+        written = core_schema.plain_serializer_function_ser_schema(
+            lambda environment: f"{environment.bits:x}"
+        )
         return core_schema.no_info_plain_validator_function(_environment, serialization=written)
 
 
@@ -69,7 +71,9 @@ def read(kind: Any, text: str) -> Any:
         return _adapter(kind).validate_json(f"[{text}]")[0]
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-    where = "".join(f"{part if str(part).isidentifier() else ascii(part)[:40]}: " for part in first["loc"][1:])
+    where = "".join(
+        f"{part if str(part).isidentifier() else ascii(part)[:40]}: " for part in first["loc"][1:]
+    )
     found = f"{first['msg'].removeprefix('Input ')}, found {reprlib.repr(first['input'])}"
     raise Invalid(f"{where}{_PLAINLY.get(first['type'], found)}")
 

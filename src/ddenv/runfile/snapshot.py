@@ -42,7 +42,9 @@ class Snapshot:
     @property
     def older_engine(self) -> str:
         """The version of the run's last engine, if it is another version than this program's; otherwise "", or if unknown."""
-        return self.state.engine_version if self.version not in ("", self.state.engine_version) else ""
+        return (
+            self.state.engine_version if self.version not in ("", self.state.engine_version) else ""
+        )
 
     @property
     def status(self) -> str:
@@ -67,8 +69,13 @@ class Snapshot:
             return None
         if self.state.waiting_candidate is not None:
             return current.candidates[self.state.waiting_candidate]
-        of_round = (test for test in self.running if test.phase == "round" and test.round == current.number)
-        return next((current.candidates[test.candidate] for test in of_round if test.candidate is not None), None)
+        of_round = (
+            test for test in self.running if test.phase == "round" and test.round == current.number
+        )
+        return next(
+            (current.candidates[test.candidate] for test in of_round if test.candidate is not None),
+            None,
+        )
 
     def seconds(self, test: int) -> float | None:
         """How far a running test is, simulated s."""

@@ -59,7 +59,11 @@ class PersistentTuple(Sequence[Item]):
         for number, chunk in enumerate(self.chunks):
             before = earlier.chunks[number] if number < len(earlier.chunks) else ()
             if chunk is not before:
-                yield from (item for place, item in enumerate(chunk) if place >= len(before) or item != before[place])
+                yield from (
+                    item
+                    for place, item in enumerate(chunk)
+                    if place >= len(before) or item != before[place]
+                )
 
     def __len__(self) -> int:
         return CHUNK * (len(self.chunks) - 1) + len(self.chunks[-1]) if self.chunks else 0
@@ -287,12 +291,16 @@ class RunState:
     @property
     def certificate(self) -> Certificate | None:
         """The last certificate, if it is one of the current environment and no search began since."""
-        return next((one for one in self.certificates[-1:] if one.node == self.node and not one.past), None)
+        return next(
+            (one for one in self.certificates[-1:] if one.node == self.node and not one.past), None
+        )
 
     @property
     def isolating(self) -> Isolation | None:
         """The isolation that has no result yet, if there is one: an engine goes on with it."""
-        return next((one for one in self.isolations[-1:] if not (one.ended or one.broken_off)), None)
+        return next(
+            (one for one in self.isolations[-1:] if not (one.ended or one.broken_off)), None
+        )
 
     @property
     def isolated(self) -> Isolation | None:
@@ -331,7 +339,11 @@ class RunState:
     def ahead(self) -> int:
         """How many tests were made ahead of time and are not needed so far."""
         needed = set(Environment(self.rests_on))
-        made = (test for test in self.tests if test.phase in ("round", CERTIFY) and test.implied_by is None)
+        made = (
+            test
+            for test in self.tests
+            if test.phase in ("round", CERTIFY) and test.implied_by is None
+        )
         return sum(test.is_finished and test.id not in needed for test in made)
 
     @property
@@ -432,7 +444,9 @@ class Candidate:
         """How many models it has."""
         split = self.split
         part = len(self.split.partitions[self.partition])
-        return part + len(split.pinned) if self.kind == "partition" else len(split.environment) - part
+        return (
+            part + len(split.pinned) if self.kind == "partition" else len(split.environment) - part
+        )
 
     @property
     def label(self) -> str:
@@ -528,7 +542,9 @@ class Test:
 
 def spent(state: RunState, until: float) -> float:
     """The time that engines have worked until Unix time `until`, s."""
-    return state.working_seconds + (0.0 if state.started_at is None else max(0.0, until - state.started_at))
+    return state.working_seconds + (
+        0.0 if state.started_at is None else max(0.0, until - state.started_at)
+    )
 
 
 def partition_letter(index: int) -> str:

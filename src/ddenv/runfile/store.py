@@ -125,7 +125,9 @@ def create(path: Path, documents: dict[str, bytes], created: Created) -> None:
         _forget(path)
         os.link(name, path)
     except FileExistsError:
-        raise UserError(f"{path}: exists already; choose another name, or attach with 'ddenv open {path}'") from None
+        raise UserError(
+            f"{path}: exists already; choose another name, or attach with 'ddenv open {path}'"
+        ) from None
     except (OSError, sqlite3.Error) as error:
         raise UserError(f"{path}: cannot be written: {error}") from None
     finally:
@@ -139,7 +141,10 @@ def _forget(path: Path) -> None:
     logs = [log for ending in LOGS if (log := path.with_name(f"{path.name}{ending}")).exists()]
     if not logs or path.exists():
         return
-    with engine_lock(path, f"{path}: an engine is still working on a deleted run of this name; choose another name"):
+    with engine_lock(
+        path,
+        f"{path}: an engine is still working on a deleted run of this name; choose another name",
+    ):
         for log in logs:
             log.unlink(missing_ok=True)
 
@@ -191,11 +196,20 @@ class RunFile:
         if application != APPLICATION_ID:
             raise UserError(f"{path}: is not a ddenv run file")
         if not OLDEST_VERSION <= version <= SCHEMA_VERSION:
-            which = "a newer ddenv" if version > SCHEMA_VERSION else "a ddenv from before its first release"
-            words = f"was written by {which} (format {version}); this one reads format {SCHEMA_VERSION}"
+            which = (
+                "a newer ddenv"
+                if version > SCHEMA_VERSION
+                else "a ddenv from before its first release"
+            )
+            words = (
+                f"was written by {which} (format {version}); this one reads format {SCHEMA_VERSION}"
+            )
             raise UserError(f"{path}: {words}")
         # A view or trigger in place of a table could run forever.
-        if {sql for (sql,) in self._all("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")} != _TABLES:
+        if {
+            sql
+            for (sql,) in self._all("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")
+        } != _TABLES:
             raise UserError(f"{path}: damaged run file: its tables are not those of a run file")
 
     def __enter__(self) -> RunFile:
@@ -215,8 +229,12 @@ class RunFile:
 
     def documents(self, prefix: str) -> dict[str, bytes]:
         """All documents whose names begin with `prefix`, by the rest of their names."""
-        rows = self._all("SELECT name, content FROM document WHERE substr(name, 1, ?) = ?", (len(prefix), prefix))
-        return {name[len(prefix) :]: content for name, content in rows if isinstance(content, bytes)}
+        rows = self._all(
+            "SELECT name, content FROM document WHERE substr(name, 1, ?) = ?", (len(prefix), prefix)
+        )
+        return {
+            name[len(prefix) :]: content for name, content in rows if isinstance(content, bytes)
+        }
 
     def events(self, after: int = 0, most: int = -1) -> list[Recorded]:
         """All events with an id above `after`, in order; at most `most` unless that is negative. Raises UserError."""
@@ -249,7 +267,9 @@ class RunFile:
 
     def motion(self, test: int) -> array[float] | None:
         """Samples of the robot in a finished test, flat rows of `COLUMNS` floats."""
-        row = self._one("SELECT samples FROM motion WHERE test = ? AND model = ?", (self._made(test), ROBOT))
+        row = self._one(
+            "SELECT samples FROM motion WHERE test = ? AND model = ?", (self._made(test), ROBOT)
+        )
         return None if row is None else _floats(row[0], self.path)
 
     def trajectory(self, test: int) -> array[float]:
@@ -261,7 +281,10 @@ class RunFile:
 
     def motions(self, test: int) -> dict[str, array[float]]:
         """Samples of every model that moved in a finished test, by name; the robot is `ROBOT`."""
-        return {model: _floats(samples, self.path) for model, samples in self.samples(self._made(test)).items()}
+        return {
+            model: _floats(samples, self.path)
+            for model, samples in self.samples(self._made(test)).items()
+        }
 
     def samples(self, test: int) -> Motions:
         """What the file has beside the end of a test, as it is there."""
@@ -275,12 +298,20 @@ class RunFile:
     def live(self) -> list[Live]:
         """The running tests, by worker slot."""
         found = []
-        for slot, test, at, text in self._all("SELECT slot, test, time, pose FROM live ORDER BY slot"):
+        for slot, test, at, text in self._all(
+            "SELECT slot, test, time, pose FROM live ORDER BY slot"
+        ):
             try:
-                number, time, poses = read(tuple[int, Real, dict[str, Pose]], f"[{test}, {at}, {text}]")
-                found.append(Live(slot=slot, test=number, time=time, pose=poses.pop(ROBOT), models=poses))
+                number, time, poses = read(
+                    tuple[int, Real, dict[str, Pose]], f"[{test}, {at}, {text}]"
+                )
+                found.append(
+                    Live(slot=slot, test=number, time=time, pose=poses.pop(ROBOT), models=poses)
+                )
             except (Invalid, KeyError):
-                raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
+                raise UserError(
+                    f"{self.path}: damaged run file: the pose of a running test is invalid"
+                ) from None
         return found
 
     # For the engine alone.
@@ -300,7 +331,11 @@ class RunFile:
         self._db.execute("PRAGMA synchronous = NORMAL")
 
     def append(
-        self, event: Event, motions: Motions | None = None, command: int | None = None, number: int | None = None
+        self,
+        event: Event,
+        motions: Motions | None = None,
+        command: int | None = None,
+        number: int | None = None,
     ) -> Recorded:
         """Records one event, with the trajectories of its test, in one transaction; `command` is the number of what caused it. The
         trajectories of a run that is no test need a `number`, which is negative. Raises UserError if the run file was deleted or
@@ -315,7 +350,11 @@ class RunFile:
                 with self._writing() as db:
                     db.execute("BEGIN IMMEDIATE")
                     id = _insert(db, "event", new.kind, new.data, new.time)
-                    rows = [(test, model, samples) for model, samples in (motions or {}).items() if test is not None]
+                    rows = [
+                        (test, model, samples)
+                        for model, samples in (motions or {}).items()
+                        if test is not None
+                    ]
                     db.executemany("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", rows)
                     db.execute("COMMIT")
                 new = replace(new, id=id)
@@ -329,7 +368,10 @@ class RunFile:
 
     def set_live(self, running: list[Live]) -> None:
         """Replaces the table of running tests."""
-        rows = [(live.slot, live.test, live.time, json.dumps({ROBOT: live.pose, **live.models})) for live in running]
+        rows = [
+            (live.slot, live.test, live.time, json.dumps({ROBOT: live.pose, **live.models}))
+            for live in running
+        ]
         # It only shows what is replaced soon.
         with suppress(NoRoom), self._writing() as db:
             db.execute("BEGIN IMMEDIATE")
@@ -375,7 +417,9 @@ class RunFile:
 
 def _unreadable(path: Path, error: Exception) -> UserError:
     locked = f"cannot be read now: {error} by another program; try again"
-    return UserError(f"{path}: {locked if 'locked' in str(error) else f'damaged run file: {error}'}")
+    return UserError(
+        f"{path}: {locked if 'locked' in str(error) else f'damaged run file: {error}'}"
+    )
 
 
 def recorded(id: Any, at: Any, kind: Any, data: Any) -> Recorded:
@@ -413,7 +457,9 @@ def _moment(value: Any) -> float:
 
 def _insert(db: sqlite3.Connection, table: str, kind: str, data: Data, at: float) -> int:
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    cursor = db.execute(f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (at, kind, text))
+    cursor = db.execute(
+        f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (at, kind, text)
+    )
     assert cursor.lastrowid is not None
     return cursor.lastrowid
 

@@ -14,7 +14,11 @@ def drops(state: RunState, tried: Candidate | Trial) -> Names:
     """The models of a candidate or a trial that fall when the others of its environment go."""
     if not state.supports:
         return ()
-    before = tried.split.environment if isinstance(tried, Candidate) else state.nodes[tried.node].environment
+    before = (
+        tried.split.environment
+        if isinstance(tried, Candidate)
+        else state.nodes[tried.node].environment
+    )
     return dropped(state.supports, tried.models, before)
 
 

@@ -18,12 +18,16 @@ def purpose(state: RunState, test: Test) -> str:
     if row is not None:
         return f"{f'round {test.round} · ' if isinstance(row, Candidate) else ''}{row.label}"
     if test.phase == "round":
-        return "what is left, with a chosen seed" if test.candidate is None else f"round {test.round}"
+        return (
+            "what is left, with a chosen seed" if test.candidate is None else f"round {test.round}"
+        )
     if test.phase == "audit":
         return "an audit of the slice"
     if test.removal is not None:
         gone = state.removals[test.removal - 1].models
-        return f"the whole world without {first_of(gone, 1)}" if gone else "the whole world, in full"
+        return (
+            f"the whole world without {first_of(gone, 1)}" if gone else "the whole world, in full"
+        )
     if test.phase == CERTIFY:
         environment = state.nodes[test.node].environment
         gone = stack_with(state, environment, test.without)
@@ -51,7 +55,11 @@ def made_for(state: RunState, test: Test | Wanted) -> Candidate | Trial | None:
     current = state.round
     if current is None or test.round != current.number or test.candidate is None:
         return None
-    return current.candidates[test.candidate] if 0 <= test.candidate < len(current.candidates) else None
+    return (
+        current.candidates[test.candidate]
+        if 0 <= test.candidate < len(current.candidates)
+        else None
+    )
 
 
 def adoptable(state: RunState) -> Trial | None:
@@ -81,4 +89,8 @@ def pointed(moment: Moment) -> Candidate | None:
     if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
         row = made_for(state, state.test(event.test))
         return row if isinstance(row, Candidate) else None
-    return state.round.candidates[event.candidate] if state.round and isinstance(event, OfCandidate) else None
+    return (
+        state.round.candidates[event.candidate]
+        if state.round and isinstance(event, OfCandidate)
+        else None
+    )

@@ -46,7 +46,12 @@ def changes(file: RunFile, state: RunState, world: World | None) -> tuple[Change
     for row in rows(margins):
         one = row.margin
         asked = row.margin.asked
-        ends = [value for side in one.sides for value in (side.goal, side.gone) if value and value.outcomes]
+        ends = [
+            value
+            for side in one.sides
+            for value in (side.goal, side.gone)
+            if value and value.outcomes
+        ]
         if not ends:
             continue
         value = min(ends, key=lambda each: (each.verdict != "goal", abs(each.value - asked.now)))
@@ -55,11 +60,24 @@ def changes(file: RunFile, state: RunState, world: World | None) -> tuple[Change
         owner, _, what = asked.name.rpartition(".")
         if owner in by_name and what in ("x", "y", "yaw"):
             for each in (each for side in one.sides for each in (side.until, side.gone) if each):
-                limits.append((each.verdict, by_name[owner], move_of(by_name[owner], what, each.value)))
+                limits.append(
+                    (each.verdict, by_name[owner], move_of(by_name[owner], what, each.value))
+                )
         share = abs(value.value - asked.now) / asked.scale
         words = f"{row.sentence}. {parting_words(parting, '', '')}".rstrip()
         to = changes_at(asked, value.value)
-        found.append(Change(name=asked.name, value=value.value, share=share, changes=to, verdict=value.verdict, sentence=words, parting=parting, limits=tuple(limits)))
+        found.append(
+            Change(
+                name=asked.name,
+                value=value.value,
+                share=share,
+                changes=to,
+                verdict=value.verdict,
+                sentence=words,
+                parting=parting,
+                limits=tuple(limits),
+            )
+        )
     return tuple(found)
 
 
@@ -67,7 +85,11 @@ def beside(state: RunState) -> Test | None:
     """The run of what is left that shows f and with which those with changed numbers are compared; None if there is none."""
     margins = state.margins
     there = margins and margins.asked.environment
-    tests = (test for test in state.tests if test.environment == there and test.outcome == F and test.run < MOST_RUNS)
+    tests = (
+        test
+        for test in state.tests
+        if test.environment == there and test.outcome == F and test.run < MOST_RUNS
+    )
     return min(tests, key=lambda test: test.run, default=None)
 
 
@@ -101,7 +123,9 @@ def _parting(file: RunFile, state: RunState, name: str, value: float) -> Parting
         return None
     for place, one in enumerate(margins.runs):
         number = -1 - margins.earlier - place
-        if (one.name, one.value, one.run) == (name, value, left.run) and (samples := file.motion(number)):
+        if (one.name, one.value, one.run) == (name, value, left.run) and (
+            samples := file.motion(number)
+        ):
             equal, apart, parted_at = parted(file.trajectory(left.id), samples)
             return Parting(
                 with_test=left.id,

@@ -45,17 +45,25 @@ def compared(first: Recent, second: Recent) -> Iterator[Difference]:
         yield name, say(first), say(second)
     both = _names(first, second, in_both=True)
     yield "in both", both, both
-    yield "only in this one", _names(first, second, in_both=False), _names(second, first, in_both=False)
+    yield (
+        "only in this one",
+        _names(first, second, in_both=False),
+        _names(second, first, in_both=False),
+    )
     yield from differences(first.chosen, second.chosen)
 
 
-def differences(first: Mapping[str, Any], second: Mapping[str, Any], above: str = "") -> Iterator[Difference]:
+def differences(
+    first: Mapping[str, Any], second: Mapping[str, Any], above: str = ""
+) -> Iterator[Difference]:
     """The settings in which two scenarios differ, by their paths such as `reduction.iterations`."""
     for key in dict.fromkeys((*first, *second)):
         one = first.get(key)
         other = second.get(key)
         if key in FILES:
-            one, other = (PurePath(each).name if isinstance(each, str) else each for each in (one, other))
+            one, other = (
+                PurePath(each).name if isinstance(each, str) else each for each in (one, other)
+            )
         if one == other or (not above and key in ASIDE):
             continue
         if isinstance(one, Mapping) and isinstance(other, Mapping):
@@ -77,7 +85,9 @@ def _names(run: Recent, other: Recent, *, in_both: bool) -> str:
 def as_recent(name: str, subject: Subject) -> Recent:
     """What `name` stands for, as a list would show it; of a scenario nothing was run."""
     state = subject.state or RunState(
-        scenario=subject.scenario.model_dump(mode="json"), elements=subject.elements, environment=subject.elements
+        scenario=subject.scenario.model_dump(mode="json"),
+        elements=subject.elements,
+        environment=subject.elements,
     )
     return recent_of(subject.run or Path(name), state, changed=0.0)
 
@@ -87,7 +97,9 @@ def unlike(first: World, second: World) -> Iterator[Difference]:
     others = {model.name: model for model in second.models}
     pairs = ((model, others[model.name]) for model in first.models if model.name in others)
     seen = ((model.name, _looks(model), _looks(other)) for model, other in pairs)
-    yield from islice(((plain(name), one, other) for name, one, other in seen if one != other), MOST_COMPARED)
+    yield from islice(
+        ((plain(name), one, other) for name, one, other in seen if one != other), MOST_COMPARED
+    )
 
 
 def _looks(model: Model) -> str:

@@ -12,7 +12,15 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
 from ddenv.runs.export import renamed
 from ddenv.runs.folder import named, run_path
-from ddenv.runs.subject import RESOURCE, Announce, check_parts, has_options, load_parts, read_parts, scenario_named
+from ddenv.runs.subject import (
+    RESOURCE,
+    Announce,
+    check_parts,
+    has_options,
+    load_parts,
+    read_parts,
+    scenario_named,
+)
 from ddenv.runs.trust import check_cluster, check_named, trust_cluster, trusted_scenario
 from ddenv.world.access import check_ending, is_world, read_bytes
 from ddenv.world.files.resources import Resources
@@ -104,12 +112,24 @@ def create_inside(run: Path, path: Path) -> World:
 
 
 def _write(
-    scenario: Scenario, world: World, path: Path, documents: dict[str, bytes], resources: Mapping[str, bytes]
+    scenario: Scenario,
+    world: World,
+    path: Path,
+    documents: dict[str, bytes],
+    resources: Mapping[str, bytes],
 ) -> None:
     documents["scenario"] = scenario.model_dump_json().encode()
     documents |= {f"{RESOURCE}{key}": content for key, content in resources.items()}
     elements = world.elements(scenario.protected)
     number = {name: at for at, name in enumerate(elements)}
     # What is welded to a model that stays is tied to nothing.
-    welds = tuple((number[one], number[other]) for one, other in world.ties if one in number and other in number)
-    create(path, documents, Created(scenario=scenario.model_dump(mode="json"), elements=elements, welds=welds))
+    welds = tuple(
+        (number[one], number[other])
+        for one, other in world.ties
+        if one in number and other in number
+    )
+    create(
+        path,
+        documents,
+        Created(scenario=scenario.model_dump(mode="json"), elements=elements, welds=welds),
+    )

@@ -36,7 +36,11 @@ class Exported:
 
 
 def export_world(
-    run: Path, sdf: Path, scenario_file: Path | None, passes: bool = False, margins: Sequence[str] = ()
+    run: Path,
+    sdf: Path,
+    scenario_file: Path | None,
+    passes: bool = False,
+    margins: Sequence[str] = (),
 ) -> Exported:
     """Writes the current environment of a run, or the nearest world that `passes`, to `sdf`, and a scenario for it if asked.
 
@@ -54,10 +58,14 @@ def export_world(
     check_ending(sdf, scenario.world)
     if not state.elements:
         raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
-    removed = frozenset(removed_in_passing(state, run) if passes else set(state.elements) - set(state.environment))
+    removed = frozenset(
+        removed_in_passing(state, run) if passes else set(state.elements) - set(state.environment)
+    )
     there = with_margins(subject, margins)
     if scenario_file is None and there.scenario != scenario:
-        raise UserError("--margin: this is a number of the scenario, not of the world: also give --scenario FILE")
+        raise UserError(
+            "--margin: this is a number of the scenario, not of the world: also give --scenario FILE"
+        )
     scenario = there.scenario
     world = there.world
     try:
@@ -67,7 +75,9 @@ def export_world(
     write_file(sdf, text)
     asked = Resources(documents)
     # What is left of a model is a whole model there.
-    minimal = parse_world(text, scenario.world, scenario.reading.model_copy(update={"inside": False}), asked)
+    minimal = parse_world(
+        text, scenario.world, scenario.reading.model_copy(update={"inside": False}), asked
+    )
     needs = list(dict.fromkeys(uri for uri, base in asked.asked if base == scenario.world.parent))
     if scenario_file is None:
         return Exported([sdf], needs, whole=state.baseline is None)
@@ -85,7 +95,9 @@ def export_world(
     asked_by_robot = Resources(documents)
     parse_model(robot, own, scenario.reading, asked_by_robot)
     both = ((scenario.world.parent, asked), (own.parent, asked_by_robot))
-    needed = [each for each, by in both if any(_leans_on(each, uri, base) for uri, base in by.asked)]
+    needed = [
+        each for each, by in both if any(_leans_on(each, uri, base) for uri, base in by.asked)
+    ]
     around = (each for each in own.absolute().parents if each.name and each.is_dir())
     needed += [each for each in around if f"package://{each.name}/".encode() in robot]
     data["reading"]["inside"] = False
@@ -103,7 +115,12 @@ def with_margins(subject: Subject, margins: Sequence[str]) -> Subject:
     for margin in margins:
         if subject.run is None or state is None:
             raise UserError("--margin: needs a run; a scenario has no margins yet")
-        name, value = _margin(state, numbers_of(scenario, world, subject.robot, state.environment), margin, subject.run)
+        name, value = _margin(
+            state,
+            numbers_of(scenario, world, subject.robot, state.environment),
+            margin,
+            subject.run,
+        )
         try:
             scenario, world = changed(scenario, world, {name: value})
         except NotPossible as error:
@@ -111,7 +128,9 @@ def with_margins(subject: Subject, margins: Sequence[str]) -> Subject:
     return replace(subject, scenario=scenario, world=world)
 
 
-def _margin(state: RunState, numbers: Mapping[str, Number], margin: str, run: Path) -> tuple[str, float]:
+def _margin(
+    state: RunState, numbers: Mapping[str, Number], margin: str, run: Path
+) -> tuple[str, float]:
     """The number that is meant, and its new value. Raises UserError."""
     name, _, given = margin.partition("=")
     if name not in numbers:
@@ -125,10 +144,14 @@ def _margin(state: RunState, numbers: Mapping[str, Number], margin: str, run: Pa
             raise UserError(f"--margin: expected NAME=NUMBER, found '{margin}'")
         return name, value
     fixes = () if state.margins is None else fixes_of(state.margins)
-    found = next((fix.value for fix in fixes if fix.name == name and fix.confirmed is not False), None)
+    found = next(
+        (fix.value for fix in fixes if fix.name == name and fix.confirmed is not False), None
+    )
     if found is None:
         again = f"look for one with: ddenv margins {run} --number '{name}', or give a value: --margin {name}=VALUE"
-        raise UserError(f"--margin: no value of {name} is known at which the robot reaches its goal; {again}")
+        raise UserError(
+            f"--margin: no value of {name} is known at which the robot reaches its goal; {again}"
+        )
     return name, found
 
 

@@ -33,7 +33,11 @@ def fetch_missing(
     """
     whole = reading.model_copy(update={"inside": False})
     tried: set[FuelModel] = set()
-    while missing := {model: uri for model, uri in missing_models(file, whole, parse).items() if model not in tried}:
+    while missing := {
+        model: uri
+        for model, uri in missing_models(file, whole, parse).items()
+        if model not in tried
+    }:
         for model, uri in missing.items():
             try:
                 folder, archive = download(model, show(model))

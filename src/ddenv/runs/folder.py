@@ -27,7 +27,9 @@ LONGEST_STEM = 180
 def runs_folder() -> Path:
     """The default folder of runs: `$DDENV_HOME/runs`, or in the user's data folder."""
     home = os.environ.get("DDENV_HOME")
-    return (Path(home) if home else Path(platformdirs.user_data_dir("ddenv", appauthor=False))) / "runs"
+    return (
+        Path(home) if home else Path(platformdirs.user_data_dir("ddenv", appauthor=False))
+    ) / "runs"
 
 
 def find_run(name: str) -> Path:
@@ -46,9 +48,9 @@ def named(name: str) -> tuple[Literal["run", "scenario", "world"], Path] | None:
     A run comes before a bundled scenario, and every file before both.
     """
     run = find_run(name)
-    if (run.is_file() and not is_read_as_world(run) and run.suffix.lower() not in SCENARIO_FILES) or name.endswith(
-        SUFFIX
-    ):
+    if (
+        run.is_file() and not is_read_as_world(run) and run.suffix.lower() not in SCENARIO_FILES
+    ) or name.endswith(SUFFIX):
         return "run", run
     return named_file(name)
 
@@ -99,7 +101,9 @@ def free_run_path(scenario_name: str, folder: Path | None = None) -> Path:
 
 def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
     """Where a new run is written: `output` (a .ddenv file or a folder), or in the runs folder. Raises UserError."""
-    if name is not None and (not name.strip() or any(char in name for char in "/\\\0") or name.startswith(".")):
+    if name is not None and (
+        not name.strip() or any(char in name for char in "/\\\0") or name.startswith(".")
+    ):
         raise UserError(f"--name: '{name}' is not a valid file name; use letters, digits, - and _")
     if output is not None and is_world(output):
         if not output.parent.is_dir():
@@ -112,4 +116,8 @@ def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
             )
         return output
     folder = output or runs_folder()
-    return free_run_path(scenario_name, folder) if name is None else folder / f"{name.removesuffix(SUFFIX)}{SUFFIX}"
+    return (
+        free_run_path(scenario_name, folder)
+        if name is None
+        else folder / f"{name.removesuffix(SUFFIX)}{SUFFIX}"
+    )

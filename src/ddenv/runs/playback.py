@@ -68,7 +68,9 @@ def played(file: RunFile, position: Position, number: int) -> Played:
     if not test.is_finished:
         why = "is still running" if test.outcome == "running" else "was lost"
         raise UserError(f"test {number} {why}: only a finished test is stored")
-    lacks = [ANOTHER_SIMULATOR] if (position.end.scenario.get("oracle") or {}).get("command") else []
+    lacks = (
+        [ANOTHER_SIMULATOR] if (position.end.scenario.get("oracle") or {}).get("command") else []
+    )
     try:
         start = position.start_of(number)
         words = purpose(position.end if start is None else start.after, test)
@@ -79,10 +81,17 @@ def played(file: RunFile, position: Position, number: int) -> Played:
     for name, samples in _stored(file, number, lacks).items():
         stored = table(samples)
         times = stored[:, 0]
-        in_time = times.size and times[0] >= 0 and times[-1] <= LONGEST and (times[:-1] <= times[1:]).all()
+        in_time = (
+            times.size
+            and times[0] >= 0
+            and times[-1] <= LONGEST
+            and (times[:-1] <= times[1:]).all()
+        )
         # No number compares with NaN.
         if not (in_time and (np.abs(stored) <= FARTHEST).all()):
-            lacks.append(f"The motion of {name or 'the robot'} in test {number} is damaged: it stays where it starts.")
+            lacks.append(
+                f"The motion of {name or 'the robot'} in test {number} is damaged: it stays where it starts."
+            )
         elif name == ROBOT:
             rows = samples
         else:
@@ -93,7 +102,14 @@ def played(file: RunFile, position: Position, number: int) -> Played:
         lacks.append(
             f"The run file has no path of the robot in test {number} (bundles leave paths out): nothing moves here."
         )
-    return Played(test=test, words=words, models=position.end.models_of(test), rows=rows, moving=moving if rows else {}, lacks=tuple(lacks))
+    return Played(
+        test=test,
+        words=words,
+        models=position.end.models_of(test),
+        rows=rows,
+        moving=moving if rows else {},
+        lacks=tuple(lacks),
+    )
 
 
 def _stored(file: RunFile, number: int, lacks: list[str]) -> dict[str, array[float]]:
@@ -110,4 +126,8 @@ def _stored(file: RunFile, number: int, lacks: list[str]) -> dict[str, array[flo
 
 def table(samples: array[float]) -> np.ndarray:
     """Samples of a run file as rows (N, 8): t (s), x, y, z (m), qw, qx, qy, qz."""
-    return np.frombuffer(samples, dtype=float).reshape(-1, COLUMNS) if samples else np.zeros((0, COLUMNS))
+    return (
+        np.frombuffer(samples, dtype=float).reshape(-1, COLUMNS)
+        if samples
+        else np.zeros((0, COLUMNS))
+    )

@@ -40,7 +40,9 @@ def usable_cores() -> int:
     The minimum of its CPU affinity and the limits of its control groups (version 1 and 2) and all groups around them, as in a
     container; a part of a core counts as one.
     """
-    cores: float = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores: float = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     for texts in _groups("cpu", ("cpu.max",), ("cpu.cfs_quota_us", "cpu.cfs_period_us")):
         # The quota of each period, both in microseconds.
         quota, period, *_ = (*map(_number, " ".join(texts).split()), math.inf, math.inf)
@@ -63,7 +65,9 @@ def free_memory() -> float:
 
 def _meminfo(key: str) -> float:
     rows = (line.split() for line in _text("proc/meminfo").splitlines())
-    return 1024 * next((_number(row[1]) for row in rows if len(row) > 1 and row[0] == f"{key}:"), math.inf)
+    return 1024 * next(
+        (_number(row[1]) for row in rows if len(row) > 1 and row[0] == f"{key}:"), math.inf
+    )
 
 
 def _memory_groups() -> Iterator[tuple[float, float]]:

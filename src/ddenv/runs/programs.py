@@ -41,16 +41,32 @@ def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen[bytes
     Raises UserError.
     """
     with RunFile(run) as file:
-        words = [sys.executable, "-m", "ddenv.engine", "--jobs", str(jobs), "--after", str(file.last_command())]
+        words = [
+            sys.executable,
+            "-m",
+            "ddenv.engine",
+            "--jobs",
+            str(jobs),
+            "--after",
+            str(file.last_command()),
+        ]
     # After `--`, a name that begins with a dash is no option.
     given = {name: value for name, value in options.items() if value is not None}
-    words += [*(f"--{name.replace('_', '-')}={value}" for name, value in given.items()), "--", str(run)]
+    words += [
+        *(f"--{name.replace('_', '-')}={value}" for name, value in given.items()),
+        "--",
+        str(run),
+    ]
     try:
         log = _log(log_of(run), run)
     except OSError as error:
-        raise UserError(f"{run}: cannot run an engine here: its log cannot be written: {error.strerror}") from None
+        raise UserError(
+            f"{run}: cannot run an engine here: its log cannot be written: {error.strerror}"
+        ) from None
     with log:
-        return subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
+        return subprocess.Popen(
+            words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True
+        )
 
 
 def _log(place: Path, run: Path) -> BinaryIO:
@@ -64,7 +80,11 @@ def export_mcap(run: Path, file: Path, stopped: Callable[[], bool]) -> None:
     """
     words = [sys.executable, "-m", "ddenv", "export", "--mcap", str(file), "--", str(run)]
     with subprocess.Popen(
-        words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        words,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
     ) as program:
         said = None
         while said is None:
@@ -74,7 +94,9 @@ def export_mcap(run: Path, file: Path, stopped: Callable[[], bool]) -> None:
                 program.kill()
                 raise UserError(f"{file}: stopped; nothing was written")
     if program.returncode:
-        raise UserError((said.strip().splitlines() or ["the program ended"])[-1].removeprefix("ddenv: "))
+        raise UserError(
+            (said.strip().splitlines() or ["the program ended"])[-1].removeprefix("ddenv: ")
+        )
 
 
 def stop_engines(engines: Sequence[tuple[RunFile, subprocess.Popen[bytes]]]) -> None:
@@ -121,7 +143,9 @@ def start_scene(run: Path) -> subprocess.Popen[str]:
     with log:
         words = [sys.executable, "-m", "ddenv.scene", str(run)]
         pipe = subprocess.PIPE
-        return subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=log, text=True, start_new_session=True)
+        return subprocess.Popen(
+            words, stdin=pipe, stdout=pipe, stderr=log, text=True, start_new_session=True
+        )
 
 
 def how_to_install(extra: str = "") -> str:

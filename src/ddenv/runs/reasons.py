@@ -102,14 +102,30 @@ def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
         kinds: dict[str, list[Test]] = {}
         for test in mine:
             kinds.setdefault(_kind(test), []).append(test)
-        ends = sorted((_end(kind, them) for kind, them in kinds.items()), key=lambda end: -end.number)
-        gone = tuple(stack_with(state, state.nodes[certificate.node].environment, str(claim.without)))
+        ends = sorted(
+            (_end(kind, them) for kind, them in kinds.items()), key=lambda end: -end.number
+        )
+        gone = tuple(
+            stack_with(state, state.nodes[certificate.node].environment, str(claim.without))
+        )
         # Also where it mostly still fails as in f: what it does else shows what the model is needed for.
         shown = next((end.kind for end in ends if end.kind != F), None)
-        pairs = ((left[test.run], test) for test in mine if test.run in left and _kind(test) == shown)
+        pairs = (
+            (left[test.run], test) for test in mine if test.run in left and _kind(test) == shown
+        )
         parting, _, lacks = parting_of(file, next(pairs, None), gone)
         exact = bool(certificate.seeds)
-        found.append(Reason(without=str(claim.without), gone=gone, runs=len(mine), ends=tuple(ends), parting=parting, lacks=lacks, exact=exact))
+        found.append(
+            Reason(
+                without=str(claim.without),
+                gone=gone,
+                runs=len(mine),
+                ends=tuple(ends),
+                parting=parting,
+                lacks=lacks,
+                exact=exact,
+            )
+        )
     return tuple(found)
 
 
@@ -125,14 +141,25 @@ def _kind(test: Test) -> str:
 
 
 def _end(kind: str, tests: Sequence[Test]) -> End:
-    places = [test.end_pose[:2] for test in tests if test.end_pose is not None] or [(math.nan, math.nan)]
+    places = [test.end_pose[:2] for test in tests if test.end_pose is not None] or [
+        (math.nan, math.nan)
+    ]
     x, y = (median(place[axis] for place in places) for axis in range(2))
     reach = max(math.dist((x, y), place) for place in places)
     away = median([test.distance for test in tests if test.distance is not None] or [math.nan])
-    return End(kind=kind, number=len(tests), seconds=median(test.simulated_seconds for test in tests), place=(x, y), reach=reach, away=away)
+    return End(
+        kind=kind,
+        number=len(tests),
+        seconds=median(test.simulated_seconds for test in tests),
+        place=(x, y),
+        reach=reach,
+        away=away,
+    )
 
 
-def parting_of(file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str]) -> tuple[Parting | None, str, str]:
+def parting_of(
+    file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str]
+) -> tuple[Parting | None, str, str]:
     """Where two tests part, one with the models `gone` and one without them; which of these took part first, "" if none did; and
     what the run file lacks to say so. None where there is no such `pair`.
     """
@@ -146,7 +173,16 @@ def parting_of(file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str
     touched = {model: at for model, at in with_it.first_touched if model in gone}
     met = touched or {model: at for model, at in with_it.first_sensed if model in gone}
     first = min(met, key=met.__getitem__, default="")
-    parting = Parting(with_test=with_it.id, without_test=without.id, seed=with_it.seed, equal=equal, apart=apart, place=place, met=met.get(first), touched=bool(touched))
+    parting = Parting(
+        with_test=with_it.id,
+        without_test=without.id,
+        seed=with_it.seed,
+        equal=equal,
+        apart=apart,
+        place=place,
+        met=met.get(first),
+        touched=bool(touched),
+    )
     return parting, first, ""
 
 
@@ -167,7 +203,11 @@ def parted(first: array[float], second: array[float]) -> tuple[float, float | No
 
 def sentence(reason: Reason) -> str:
     """What happens without the models, in one sentence, from the runs that show it."""
-    others = f" and what rests on it ({count(len(reason.gone) - 1, 'model')})" if len(reason.gone) > 1 else ""
+    others = (
+        f" and what rests on it ({count(len(reason.gone) - 1, 'model')})"
+        if len(reason.gone) > 1
+        else ""
+    )
     without = f"Without {reason.without}{others}"
     kind = "chosen run" if reason.exact else "fresh run"
     if not reason.ends:
@@ -212,7 +252,9 @@ def parting_words(one: Parting | None, lacks: str, met: str, it: str = "it") -> 
         apart = f"{APART:g} m apart after {one.apart:.1f} s, at ({coordinates(one.place)}) m"
         words = f"With seed {one.seed} the two runs differ {start}, and are {apart}."
     if one.met is not None:
-        words += f" {met} the robot {'touches' if one.touched else 'senses'} {it} after {one.met:.1f} s."
+        words += (
+            f" {met} the robot {'touches' if one.touched else 'senses'} {it} after {one.met:.1f} s."
+        )
     return words
 
 
@@ -254,11 +296,15 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
         return Nearest(gone=(), words=words, shown=shown)
     gone = state.removals[one.found - 1].models
     # A run of the whole world that fails, if possible as in f, and one of its seed, in the passing world, that does not.
-    passing = {test.run: test for test in state.tests if test.removal == one.found and test.outcome == GOAL}
+    passing = {
+        test.run: test for test in state.tests if test.removal == one.found and test.outcome == GOAL
+    }
     whole = [test for test in state.tests if test.run in passing and test.environment == 0]
     failing = [test for test in whole if test.outcome in (F, "other")]
     chosen = min(failing, key=lambda test: (test.outcome != F, test.cut, test.id), default=None)
-    parting, first, lacks = parting_of(file, None if chosen is None else (chosen, passing[chosen.run]), gone)
+    parting, first, lacks = parting_of(
+        file, None if chosen is None else (chosen, passing[chosen.run]), gone
+    )
     return Nearest(gone=gone, words=words, shown=shown, parting=parting, first=first, lacks=lacks)
 
 

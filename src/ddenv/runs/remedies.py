@@ -43,11 +43,17 @@ def remedy(text: str) -> str:
     if "/" in text or text.startswith(("~", ".")) or names_folder:
         folder = without_tilde(text).absolute()
         if not is_folder(folder):
-            raise UserError(f"{folder} is a file; name a folder" if folder.exists() else f"there is no folder {folder}")
+            raise UserError(
+                f"{folder} is a file; name a folder"
+                if folder.exists()
+                else f"there is no folder {folder}"
+            )
         return str(folder)
     stand_in = parse_stand_in(text, "remedy") if text else AUTO
     if isinstance(stand_in, str) and stand_in not in (AUTO, NONE):
-        raise UserError(f"{text} is for single meshes, with --stand-in; auto takes the box around the visuals, too")
+        raise UserError(
+            f"{text} is for single meshes, with --stand-in; auto takes the box around the visuals, too"
+        )
     return text
 
 
@@ -61,6 +67,11 @@ def _is_usable(text: str) -> bool:
 def with_remedies(options: Mapping[str, Any], found: Mapping[str, str]) -> Data:
     """The `options` of the command line that say the same as the remedies, too."""
     folders = tuple(dict.fromkeys(Path(text) for text in found.values() if text.startswith("/")))
-    stand_ins = tuple(f"{uri}={text}" for uri, text in found.items() if text and not text.startswith("/"))
+    stand_ins = tuple(
+        f"{uri}={text}" for uri, text in found.items() if text and not text.startswith("/")
+    )
     more = {"model_path": folders, "stand_in": stand_ins}
-    return {**options, **{name: (*options.get(name, ()), *each) for name, each in more.items() if each}}
+    return {
+        **options,
+        **{name: (*options.get(name, ()), *each) for name, each in more.items() if each},
+    }

@@ -81,13 +81,19 @@ def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None 
 
 def has_options(given: Mapping[str, Any], *but: str) -> bool:
     """Whether any of these options was given, `but` some."""
-    return any(value is not None and value != () for name, value in given.items() if name not in ("remembered", *but))
+    return any(
+        value is not None and value != ()
+        for name, value in given.items()
+        if name not in ("remembered", *but)
+    )
 
 
 # From files and options.
 
 
-def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | None = None) -> Scenario:
+def scenario_named(
+    name: str, given: Mapping[str, Any], announce: Announce | None = None
+) -> Scenario:
     """The scenario of a name or a file, with the options `given`: places, those on how its world is read, and settings.
 
     Raises UserError.
@@ -179,8 +185,12 @@ def with_remembered(world: Path, reading: Reading, announce: Announce | None = N
         except UserError:
             break
     if found and announce is not None:
-        names = first_of([f"{shortened(uri, LONGEST)} ({text})" for uri, text in found.items()], NAMED)
-        announce(f"uses what you chose for {names}; {state_file(REMEDIES)} keeps that, --no-remembered leaves it out")
+        names = first_of(
+            [f"{shortened(uri, LONGEST)} ({text})" for uri, text in found.items()], NAMED
+        )
+        announce(
+            f"uses what you chose for {names}; {state_file(REMEDIES)} keeps that, --no-remembered leaves it out"
+        )
     return read_as if found else reading
 
 
@@ -197,7 +207,11 @@ def without_guesses_at_start(scenario: Scenario, announce: Announce | None = Non
     while True:
         world = read_world(scenario.world, reading)
         around = at_start(world, robot, scenario.robot.spawn)
-        uris = [uri for name, uri in world.guessed if around is not None and name in (around.name, around.inside)]
+        uris = [
+            uri
+            for name, uri in world.guessed
+            if around is not None and name in (around.name, around.inside)
+        ]
         if not uris:
             break
         left_out += uris
@@ -209,7 +223,9 @@ def without_guesses_at_start(scenario: Scenario, announce: Announce | None = Non
     return scenario.model_copy(update={"reading": reading})
 
 
-def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: Point) -> Scenario:
+def scenario_for_world(
+    world: Path, spawn: tuple[float, float, float, float], goal: Point
+) -> Scenario:
     """A scenario for the bundled robot in any SDF world: `spawn` x, y, z m and yaw rad, `goal` x, y m. Raises UserError."""
     data = {
         "name": world.stem.removesuffix(".dmd")[:80] or "world",
@@ -242,8 +258,15 @@ def with_options(
     for name, value in given.items():
         one = SETTINGS.get(name)
         # 0 takes back a limit; words are checked with the scenario.
-        if one and not isinstance(value, bool | str) and (value or not one.none) and not one.allows(value):
-            raise UserError(f"{one.option or one.key}: expected {one.range}, found {number_text(value)}")
+        if (
+            one
+            and not isinstance(value, bool | str)
+            and (value or not one.none)
+            and not one.allows(value)
+        ):
+            raise UserError(
+                f"{one.option or one.key}: expected {one.range}, found {number_text(value)}"
+            )
     chosen = with_values(scenario.model_dump(mode="json"), given)
     if spawn is not None:
         chosen["robot"]["spawn"] = dict(zip(("x", "y", "z", "yaw"), spawn, strict=False))
@@ -256,7 +279,12 @@ def with_options(
         chosen["reading"] = reading.model_dump(mode="json")
     named = {SETTINGS[name].key: SETTINGS[name].option for name in given if SETTINGS[name].option}
     places = (("--spawn", "robot.spawn", spawn), ("--goal", "goal", goal))
-    named |= {f"{key}.{axis}": option for option, key, place in places if place for axis in ("x", "y", "z", "yaw")}
+    named |= {
+        f"{key}.{axis}": option
+        for option, key, place in places
+        if place
+        for axis in ("x", "y", "z", "yaw")
+    }
     return validate(chosen, "options", named)
 
 
@@ -297,8 +325,13 @@ def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
     if not world.elements(scenario.protected):
         raise UserError(f"{scenario.world}: has no model that can be removed")
     if scenario.reading.inside and not any(model.inside for model in world.models):
-        why = next((note.why for note in world.notes if note.what == "--inside"), "no static model has two collisions")
-        raise UserError(f"{scenario.world}: --inside: no model has parts that can be removed: {why}")
+        why = next(
+            (note.why for note in world.notes if note.what == "--inside"),
+            "no static model has two collisions",
+        )
+        raise UserError(
+            f"{scenario.world}: --inside: no model has parts that can be removed: {why}"
+        )
     check_spawn(world, robot, scenario.robot.spawn, scenario.goal)
 
 
@@ -309,8 +342,16 @@ def read_subject(file: RunFile) -> Subject:
     """The scenario, world and robot of a run, and its state. Raises UserError."""
     scenario, world, robot = read_parts(file)
     state = fold(file.events())
-    failure = scenario.failure.model_copy(update={"epsilon": read(state.scenario, SETTINGS["epsilon"])})
-    return Subject(scenario=scenario.model_copy(update={"failure": failure}), world=world, robot=robot, run=file.path, state=state)
+    failure = scenario.failure.model_copy(
+        update={"epsilon": read(state.scenario, SETTINGS["epsilon"])}
+    )
+    return Subject(
+        scenario=scenario.model_copy(update={"failure": failure}),
+        world=world,
+        robot=robot,
+        run=file.path,
+        state=state,
+    )
 
 
 def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:

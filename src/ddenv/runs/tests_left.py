@@ -70,10 +70,14 @@ def remaining(state: RunState, at_work: bool) -> Remaining | None:
     if not at_work or state.paused or state.needs_room or state.waiting_candidate is not None:
         return Remaining((low, likely, high), None)
     # Real time from one finished test to the next, s.
-    finished = (test.wall_seconds for test in islice(reversed(state.tests), 2 * LATEST) if test.is_finished)
+    finished = (
+        test.wall_seconds for test in islice(reversed(state.tests), 2 * LATEST) if test.is_finished
+    )
     times = [each for each in islice(finished, LATEST) if each > 0]
     each = sum(times) / len(times) / (1 + BUSY * (max(1, state.jobs) - 1)) if times else None
-    return Remaining((low, likely, high), None if each is None else (low * each, likely * each, high * each))
+    return Remaining(
+        (low, likely, high), None if each is None else (low * each, likely * each, high * each)
+    )
 
 
 def left_said(state: RunState, at_work: bool) -> Sentences:
@@ -98,7 +102,11 @@ def _is_overdue(state: RunState) -> bool:
     if now is not None:
         return fresh_runs_made(state, now) >= expected_fresh_runs(state, now)[-1]
     searches = not (state.confirming or state.isolating is not None)
-    return searches and forecast is not None and state.tests_done - forecast.tests_done >= forecast.tests[-1]
+    return (
+        searches
+        and forecast is not None
+        and state.tests_done - forecast.tests_done >= forecast.tests[-1]
+    )
 
 
 def _expected(state: RunState) -> Expected | None:
@@ -109,7 +117,11 @@ def _expected(state: RunState) -> Expected | None:
         return None
     if state.confirming:
         now = in_the_making(state)
-        return None if now is None else _after(expected_fresh_runs(state, now), fresh_runs_made(state, now))
+        return (
+            None
+            if now is None
+            else _after(expected_fresh_runs(state, now), fresh_runs_made(state, now))
+        )
     if forecast is None or baseline is None:
         return None
     left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
@@ -136,7 +148,11 @@ def search_tests(models: int, asked: Reduction, rate: float | None = None) -> Ex
     runs = {"first": 1 + asked.iterations, "exact": asked.exact_seeds}.get(
         asked.accept_rate, min(1 + asked.iterations, FEWEST_MISSES)
     )
-    key = "ddenv as printed" if asked.algorithm == "ddenv" and asked.growth == "paper" else asked.algorithm
+    key = (
+        "ddenv as printed"
+        if asked.algorithm == "ddenv" and asked.growth == "paper"
+        else asked.algorithm
+    )
     factor, power = SCALE.get(key, SCALE["ddenv"])
     likely = factor * models**power * (1 + RERUN * (runs - 1))
     # A few models make few different candidates.
@@ -156,11 +172,15 @@ class Rough:
 
     @property
     def tests(self) -> Expected:
-        low, likely, high = (self.baseline + sum(each) for each in zip(self.search, self.certificate, strict=True))
+        low, likely, high = (
+            self.baseline + sum(each) for each in zip(self.search, self.certificate, strict=True)
+        )
         return low, likely, high
 
 
-def rough_run(models: int, asked: Reduction, rate: float | None = None, slices: bool = True) -> Rough:
+def rough_run(
+    models: int, asked: Reduction, rate: float | None = None, slices: bool = True
+) -> Rough:
     """Before there is a run: of `models` that can be removed, where f shows at `rate`, or if all runs of the baseline show it.
 
     With `slices`, and if they are asked for, only what took part in the baseline is searched. That has little to do with the size
@@ -175,7 +195,9 @@ def rough_run(models: int, asked: Reduction, rate: float | None = None, slices: 
         rate = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1)
         seen = 0
     few, usual, many = (search_tests(each, asked, rate) for each in searched)
-    certificate = certificate_tests(rate, asked.certify_rate, min(models, SURVIVORS), asked.baseline_runs, seen)
+    certificate = certificate_tests(
+        rate, asked.certify_rate, min(models, SURVIVORS), asked.baseline_runs, seen
+    )
     if asked.accept_rate == "exact":
         certificate = (RUNS_BESIDE,) * 3
     return Rough(asked.baseline_runs, (few[0], usual[1], many[2]), certificate)

@@ -59,7 +59,9 @@ def program_of(scenario: Scenario) -> Program | None:
     found = [*_own_program(scenario), *_cluster_of(scenario)]
     if not found:
         return None
-    return Program(", and ".join(each.words for each in found), sum((each.digests for each in found), ()))
+    return Program(
+        ", and ".join(each.words for each in found), sum((each.digests for each in found), ())
+    )
 
 
 def _cluster_of(scenario: Scenario) -> list[Program]:
@@ -67,7 +69,12 @@ def _cluster_of(scenario: Scenario) -> list[Program]:
     cluster = scenario.reduction.cluster
     if cluster == HERE:
         return []
-    return [_program(f"its tests on the cluster {cluster}; whoever controls that can start any program here", [])]
+    return [
+        _program(
+            f"its tests on the cluster {cluster}; whoever controls that can start any program here",
+            [],
+        )
+    ]
 
 
 def _own_program(scenario: Scenario) -> list[Program]:
@@ -91,7 +98,9 @@ def _own_program(scenario: Scenario) -> list[Program]:
     # In every form that Python looks for; an installed module is the user's own choice.
     module = use.partition(":")[0].partition(".")[0]
     # A run file may have the module's name, too, and changes all the time.
-    alone = [path for path in folder.glob(f"{module}.*") if path.name.endswith(tuple(all_suffixes()))]
+    alone = [
+        path for path in folder.glob(f"{module}.*") if path.name.endswith(tuple(all_suffixes()))
+    ]
     found = (*alone, *(folder / module).rglob("*"))
     # Python itself writes into this folder.
     files = sorted(path for path in found if "__pycache__" not in path.parts and is_file(path))
@@ -161,7 +170,9 @@ def trust_cluster(scenario: Scenario) -> None:
         trust(cluster)
 
 
-def check_trusted(scenario: Scenario, where: Path | str, asks: Callable[[str], bool] = lambda _: False) -> None:
+def check_trusted(
+    scenario: Scenario, where: Path | str, asks: Callable[[str], bool] = lambda _: False
+) -> None:
     """Raises UserError, naming `where` it is from, if tests would start a program that the user has not trusted.
 
     `asks` puts a question to the user; a yes is remembered.
@@ -180,7 +191,9 @@ def check_named(scenario: Scenario, name: str, asks: Callable[[str], bool]) -> N
     check_trusted(scenario, name, asks)
 
 
-def trusted_scenario(file: RunFile, asks: Callable[[str], bool], cluster: str | None = None) -> Scenario:
+def trusted_scenario(
+    file: RunFile, asks: Callable[[str], bool], cluster: str | None = None
+) -> Scenario:
     """The scenario of a run, after the same check; the user has typed another `cluster`, if any.
 
     Raises UserError for a damaged file, too.
@@ -204,12 +217,16 @@ def check_cluster(cluster: str) -> None:
             f"scheduler file that is there, found '{cluster}'"
         )
     if find_spec("distributed") is None:
-        raise UserError(f"options: reduction.cluster: Dask is not installed here: {how_to_install('cluster')}")
+        raise UserError(
+            f"options: reduction.cluster: Dask is not installed here: {how_to_install('cluster')}"
+        )
 
 
 def made_here(scenario: Scenario) -> Scenario:
     """`scenario` with its tests on this machine."""
-    return scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update={"cluster": HERE})})
+    return scenario.model_copy(
+        update={"reduction": scenario.reduction.model_copy(update={"cluster": HERE})}
+    )
 
 
 def hosts_of(cluster: str) -> list[str]:

@@ -49,7 +49,11 @@ def view(start: Vector, goal: Vector) -> View:
 
 def _polar(distance: float, azimuth: float, elevation: float) -> Vector:
     flat = distance * math.cos(math.radians(elevation))
-    return flat * math.cos(azimuth), flat * math.sin(azimuth), distance * math.sin(math.radians(elevation))
+    return (
+        flat * math.cos(azimuth),
+        flat * math.sin(azimuth),
+        distance * math.sin(math.radians(elevation)),
+    )
 
 
 def set_up(stage: Stage, view: View) -> None:
@@ -58,16 +62,34 @@ def set_up(stage: Stage, view: View) -> None:
     stage.move(WORLD, Pose((-x, -y, -z)))
     east, north, up = view.camera
     # In the camera's frame y points upwards.
-    for name, value in (("fov", FIELD_OF_VIEW), ("near", 0.1), ("far", 600.0), ("position", [east, up, -north])):
+    for name, value in (
+        ("fov", FIELD_OF_VIEW),
+        ("near", 0.1),
+        ("far", 600.0),
+        ("position", [east, up, -north]),
+    ):
         stage.set(_CAMERA, name, value)
     lights = ("PointLightNegativeX", "PointLightPositiveX", "FillLight", "SpotLight")
     for path in (("Grid",), ("Axes",), *(("Lights", name) for name in lights)):
         stage.show(path, False)
     stage.set(("Lights", "AmbientLight", DRAWN), "intensity", 0.62)
     reach = 1.7 * view.radius
-    sides = {"left": -reach, "right": reach, "top": reach, "bottom": -reach, "near": 0.1, "far": 8 * view.radius}
+    sides = {
+        "left": -reach,
+        "right": reach,
+        "top": reach,
+        "bottom": -reach,
+        "near": 0.1,
+        "far": 8 * view.radius,
+    }
     camera = {"type": "OrthographicCamera", **sides}
-    shadow = {"bias": -0.0004, "normalBias": 0.01, "radius": 2, "mapSize": [2048, 2048], "camera": camera}
+    shadow = {
+        "bias": -0.0004,
+        "normalBias": 0.01,
+        "radius": 2,
+        "mapSize": [2048, 2048],
+        "camera": camera,
+    }
     matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, *view.sun, 1]
     light = {"type": "DirectionalLight", "color": 0xFFFAF2, "intensity": 0.62, "matrix": matrix}
     stage.draw_json(("Lights", "Sun"), {**light, "castShadow": True, "shadow": shadow})

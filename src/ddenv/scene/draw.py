@@ -78,7 +78,8 @@ class Scenery:
         self._painted: dict[str, list[Surface]] = {}
         self._edges: dict[str, np.ndarray] = {}
         surfaces = [
-            self._draw_model(number, model, model.name in elements) for number, model in enumerate(world.models)
+            self._draw_model(number, model, model.name in elements)
+            for number, model in enumerate(world.models)
         ]
         self.surface = merge(surfaces)
         self.ground = self._draw_ground(world)
@@ -94,7 +95,9 @@ class Scenery:
     def height(self, x: float, y: float) -> float:
         """Height of the highest surface at (x, y), m."""
         ground = None if self.ground is None else _height_of(self.ground, x, y)
-        heights = [height for height in (mesh.height_at(self.surface, x, y), ground) if height is not None]
+        heights = [
+            height for height in (mesh.height_at(self.surface, x, y), ground) if height is not None
+        ]
         return max(heights, default=0.0)
 
     def show(self, shot: Shot) -> None:
@@ -105,7 +108,9 @@ class Scenery:
 
     def _together(self, shot: Shot) -> Iterator[tuple[Path, Object | None]]:
         """What shows the elements that never move, and the edges of those that are gone; None where nothing is left to show."""
-        items = [item for name, items in self._painted.items() if name in shot.models for item in items]
+        items = [
+            item for name, items in self._painted.items() if name in shot.models for item in items
+        ]
         for name, solid in (("still", True), ("still clear", False)):
             some = [item for item in items if (item.alpha == 1) == solid]
             yield (*MODELS, name), merge(some).thing() if some else None
@@ -128,7 +133,9 @@ class Scenery:
             self._stage.move((*MODELS, self.movers[name]), Pose())
         self._placed = frozenset(name for name in poses if name in self.movers)
         for name in sorted(self._placed):
-            self._stage.move((*MODELS, self.movers[name]), self.moved(name, poses[name]), newest_only=True)
+            self._stage.move(
+                (*MODELS, self.movers[name]), self.moved(name, poses[name]), newest_only=True
+            )
 
     def moved(self, name: str, pose: Pose) -> Pose:
         """How far a moving model is from its start once its first link is at `pose`."""
@@ -142,7 +149,11 @@ class Scenery:
     def ghost_of(self, model: Model) -> list[bytes]:
         """The messages that draw a model, as the ghost sees it, for one browser."""
         surface = merge([replace(one, tints=None, alpha=1.0) for one in paint(model)])
-        return [self._stage.drawn((*GHOST_TRAIL, "model"), plain(surface, colors.GHOST))] if len(surface.faces) else []
+        return (
+            [self._stage.drawn((*GHOST_TRAIL, "model"), plain(surface, colors.GHOST))]
+            if len(surface.faces)
+            else []
+        )
 
     def still(self, shot: Shot) -> list[bytes]:
         """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`keys`)."""
@@ -157,7 +168,9 @@ class Scenery:
         places = list[Letter]()
         edges = dict[Color, list[np.ndarray]]()
         for letter, color, names in groups:
-            for name, (low, high) in [(name, box) for name in names if (box := self._boxes.get(name)) is not None]:
+            for name, (low, high) in [
+                (name, box) for name in names if (box := self._boxes.get(name)) is not None
+            ]:
                 ends = edges_of(low, high)
                 (x, y) = ((low + high) / 2)[:2]
                 listed = len(places) < MOST_LETTERS
@@ -171,7 +184,9 @@ class Scenery:
                     places.append((letter, css, float(x), float(y), float(high[2]), key))
         # One object for each colour: of thousands of partitions, a browser would take minutes to make one each.
         for number, (color, all_ends) in enumerate(edges.items()):
-            self._stage.draw((*PARTS, str(number)), lines(np.concatenate(all_ends), color), shadow=False)
+            self._stage.draw(
+                (*PARTS, str(number)), lines(np.concatenate(all_ends), color), shadow=False
+            )
         return places
 
     def evidence(self, samples: np.ndarray | None) -> None:
@@ -224,7 +239,11 @@ class Scenery:
         """Draws the plane that is highest at the origin, which may slope. Returns its pose there; None without planes."""
         solids = [one for model in world.models if is_ground(model) for one in model.collisions]
         planes = [one.pose for one in solids if isinstance(one.shape, Plane)]
-        places = [(height, plane) for plane in planes if (height := _height_of(plane, 0.0, 0.0)) is not None]
+        places = [
+            (height, plane)
+            for plane in planes
+            if (height := _height_of(plane, 0.0, 0.0)) is not None
+        ]
         if not places:
             return None
         height, plane = max(places, key=lambda place: place[0])
@@ -241,8 +260,12 @@ class Scenery:
     def _draw_robot(self) -> float:
         body = self.wheels.body
         to_first = body.links[0].pose.inverse()
-        pieces: list[tuple[Path, Pose, list[Surface]]] = [((), Pose(), [item.at(to_first) for item in paint(body)])]
-        pieces += [((wheel.key,), Pose(wheel.position), [wheel.painted]) for wheel in self.wheels.all]
+        pieces: list[tuple[Path, Pose, list[Surface]]] = [
+            ((), Pose(), [item.at(to_first) for item in paint(body)])
+        ]
+        pieces += [
+            ((wheel.key,), Pose(wheel.position), [wheel.painted]) for wheel in self.wheels.all
+        ]
         lowest = 0.0
         for place, pose, painted in pieces:
             for part, item in enumerate(painted):
@@ -265,7 +288,10 @@ def _height_of(plane: Pose, x: float, y: float) -> float | None:
 
 
 # What stands in a ring.
-PIN = (mesh.frustum(0.0, 0.13, 0.4).at(Pose((0.0, 0.0, 0.75))), mesh.sphere(0.13).at(Pose((0.0, 0.0, 0.97))))
+PIN = (
+    mesh.frustum(0.0, 0.13, 0.4).at(Pose((0.0, 0.0, 0.75))),
+    mesh.sphere(0.13).at(Pose((0.0, 0.0, 0.97))),
+)
 FLAG = (
     mesh.frustum(0.025, 0.025, 1.5).at(Pose((0.0, 0.0, 0.75))),
     mesh.box((0.55, 0.02, 0.34)).at(Pose((0.28, 0.0, 1.33))),
@@ -283,6 +309,9 @@ def mark(
 ) -> None:
     """Draws a ring of `radius` m around `position`, with what stands `inside`, visible from afar and from above."""
     path = (*WORLD, name)
-    shapes = [mesh.ring(radius, 0.05 * scale), *(replace(one, vertices=scale * one.vertices) for one in inside)]
+    shapes = [
+        mesh.ring(radius, 0.05 * scale),
+        *(replace(one, vertices=scale * one.vertices) for one in inside),
+    ]
     stage.draw(path, plain(merge(shapes), color, glow=0.35), shadow=False)
     stage.move(path, Pose(position))

@@ -69,7 +69,9 @@ class Surface:
         """What a browser draws of a painted surface."""
         geometry = meshcat.TriangularMeshGeometry(self.vertices, self.faces, color=self.tints)
         # Only the outside is drawn: two-sided faces would cast shadows on themselves.
-        return meshcat.Mesh(geometry, meshcat.MeshLambertMaterial(vertexColors=True, side=0, opacity=self.alpha))
+        return meshcat.Mesh(
+            geometry, meshcat.MeshLambertMaterial(vertexColors=True, side=0, opacity=self.alpha)
+        )
 
 
 EMPTY = Surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32))
@@ -92,9 +94,14 @@ def merge(surfaces: Sequence[Surface]) -> Surface:
 
 # Corners of a box around the origin with sides of 1, numbered by their bits x, y, z, and the edges that join them.
 CORNERS = np.array([(x, y, z) for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)])
-EDGES = np.array([(a, a | 1 << axis) for axis in range(3) for a in range(8) if not a >> axis & 1]).ravel()
+EDGES = np.array(
+    [(a, a | 1 << axis) for axis in range(3) for a in range(8) if not a >> axis & 1]
+).ravel()
 _SIDES = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
-_HALVES = np.array([(4 * side, 4 * side + a, 4 * side + a + 1) for side in range(6) for a in (1, 2)], dtype=np.uint32)
+_HALVES = np.array(
+    [(4 * side, 4 * side + a, 4 * side + a + 1) for side in range(6) for a in (1, 2)],
+    dtype=np.uint32,
+)
 
 
 def box(size: Sequence[float]) -> Surface:
@@ -108,7 +115,9 @@ def revolved(*profiles: Sequence[Point], sides: int = SIDES) -> Surface:
     parts = []
     for profile in profiles:
         radii, heights = np.array(profile, dtype=float).T[:, :, None]
-        points = np.stack([radii * np.cos(angles), radii * np.sin(angles), heights + 0 * angles], axis=-1)
+        points = np.stack(
+            [radii * np.cos(angles), radii * np.sin(angles), heights + 0 * angles], axis=-1
+        )
         parts.append(Surface(points.reshape(-1, 3), _sheet(len(profile), sides)))
     return merge(parts)
 
@@ -129,7 +138,9 @@ def capsule(radius: float, length: float) -> Surface:
     """A cylinder of `length` along z, centred on its frame's origin, with a hemisphere on each end."""
     top = _arc(radius, 0.0, math.pi / 2, SIDES // 4)
     bottom = _arc(radius, math.pi / 2, math.pi, SIDES // 4)
-    return revolved([*((r, z + length / 2) for r, z in top), *((r, z - length / 2) for r, z in bottom)])
+    return revolved(
+        [*((r, z + length / 2) for r, z in top), *((r, z - length / 2) for r, z in bottom)]
+    )
 
 
 def ring(radius: float, thickness: float) -> Surface:
@@ -140,7 +151,10 @@ def ring(radius: float, thickness: float) -> Surface:
 
 def _arc(radius: float, begin: float, end: float, pieces: int) -> list[Point]:
     """A part of a circle as a profile; angles from z on, rad."""
-    return [(radius * math.sin(at), radius * math.cos(at)) for at in np.linspace(begin, end, pieces + 1).tolist()]
+    return [
+        (radius * math.sin(at), radius * math.cos(at))
+        for at in np.linspace(begin, end, pieces + 1).tolist()
+    ]
 
 
 def creased(mesh: Mesh) -> Surface:
@@ -150,7 +164,9 @@ def creased(mesh: Mesh) -> Surface:
     flat = mesh.faces.ravel()
     count = len(mesh.vertices)
     weights = np.repeat(normals, 3, axis=0)
-    common = np.column_stack([np.bincount(flat, weights[:, axis], count) for axis in range(3)])[mesh.faces]
+    common = np.column_stack([np.bincount(flat, weights[:, axis], count) for axis in range(3)])[
+        mesh.faces
+    ]
     along = np.einsum("fi,fci->fc", normals, common)
     lengths = np.linalg.norm(normals, axis=1)[:, None] * np.linalg.norm(common, axis=2)
     sharp = along < math.cos(SMOOTH) * lengths
@@ -159,7 +175,9 @@ def creased(mesh: Mesh) -> Surface:
     used = np.zeros(count + int(sharp.sum()), dtype=bool)
     used[faces] = True
     number = np.cumsum(used) - 1
-    return Surface(np.concatenate([mesh.vertices, corners[sharp]])[used], number[faces].astype(np.uint32))
+    return Surface(
+        np.concatenate([mesh.vertices, corners[sharp]])[used], number[faces].astype(np.uint32)
+    )
 
 
 def tube(points: np.ndarray, radius: float) -> Surface:
@@ -179,7 +197,10 @@ def tube(points: np.ndarray, radius: float) -> Surface:
     aside /= np.maximum(np.linalg.norm(aside, axis=1, keepdims=True), 1e-12)
     over = np.cross(ahead, aside)
     angles = -np.arange(8) * math.pi / 4
-    section = np.cos(angles)[None, :, None] * aside[:, None] + np.sin(angles)[None, :, None] * over[:, None]
+    section = (
+        np.cos(angles)[None, :, None] * aside[:, None]
+        + np.sin(angles)[None, :, None] * over[:, None]
+    )
     return Surface((path[:, None] + radius * section).reshape(-1, 3), _sheet(len(path), 8))
 
 
@@ -232,7 +253,9 @@ def _sheet(rows: int, columns: int) -> np.ndarray:
     right = row * columns + (column + 1) % columns
     below = here + columns
     diagonal = right + columns
-    faces = np.stack([np.stack([here, below, diagonal], axis=-1), np.stack([here, diagonal, right], axis=-1)])
+    faces = np.stack(
+        [np.stack([here, below, diagonal], axis=-1), np.stack([here, diagonal, right], axis=-1)]
+    )
     return faces.reshape(-1, 3).astype(np.uint32)
 
 
@@ -240,7 +263,9 @@ def paint(model: Model) -> list[Surface]:
     """All visuals of a model, in the frame of its poses, by transparency. A link without visuals shows its collisions."""
     groups: dict[float, list[Surface]] = {}
     default = colors.STILL if model.static else colors.MOVABLE
-    shown: list[Visual | Collision] = [item for link in model.links for item in link.visuals or link.collisions]
+    shown: list[Visual | Collision] = [
+        item for link in model.links for item in link.visuals or link.collisions
+    ]
     for item in shown:
         color = (item.color if isinstance(item, Visual) else None) or default
         if not isinstance(item.shape, Plane):
@@ -256,15 +281,23 @@ def plain(shape: Surface, color: Color, *, glow: float = 0.0, offset: int = 0) -
         red, green, blue, _ = color
         options["emissive"] = colors.hexadecimal((glow * red, glow * green, glow * blue, 1.0))
     if offset:
-        options |= {"polygonOffset": True, "polygonOffsetFactor": offset, "polygonOffsetUnits": offset}
-    material = meshcat.MeshLambertMaterial(color=colors.hexadecimal(color), opacity=color[3], side=0, **options)
+        options |= {
+            "polygonOffset": True,
+            "polygonOffsetFactor": offset,
+            "polygonOffsetUnits": offset,
+        }
+    material = meshcat.MeshLambertMaterial(
+        color=colors.hexadecimal(color), opacity=color[3], side=0, **options
+    )
     return meshcat.Mesh(meshcat.TriangularMeshGeometry(shape.vertices, shape.faces), material)
 
 
 def lines(ends: np.ndarray, color: Color) -> meshcat.LineSegments:
     """Line segments between pairs of `ends` (2 N, 3)."""
     material = meshcat.LineBasicMaterial(color=colors.hexadecimal(color), opacity=color[3])
-    return meshcat.LineSegments(meshcat.PointsGeometry(np.asarray(ends, dtype=np.float32).T), material)
+    return meshcat.LineSegments(
+        meshcat.PointsGeometry(np.asarray(ends, dtype=np.float32).T), material
+    )
 
 
 def outline(model: Model, shape: Surface) -> np.ndarray:

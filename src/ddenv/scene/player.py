@@ -109,7 +109,11 @@ class Player:
             "turned": scenery.wheels.turned(one.robot).round(DIGITS).tolist(),
             "moving": moving,
             "there": [key for name in sorted(shot.models) if (key := scenery.keys.get(name))],
-            "gone": [key for name in sorted(shot.left_out | shot.removed) if (key := scenery.keys.get(name))],
+            "gone": [
+                key
+                for name in sorted(shot.left_out | shot.removed)
+                if (key := scenery.keys.get(name))
+            ],
             "lacks": " ".join(one.lacks),
         }
 
@@ -121,12 +125,17 @@ class Player:
         """
         found: list[tuple[str, Parting | None]] = []
         with suppress(UserError):
-            found += [(f"with and without {each.without}", each.parting) for each in reasons(self._run, self._state)]
+            found += [
+                (f"with and without {each.without}", each.parting)
+                for each in reasons(self._run, self._state)
+            ]
         if (near := nearest(self._run, self._state)) is not None:
             found.append(("with and the nearest world that passes", near.parting))
         with suppress(UserError):
             others = changes(self._run, self._state, None)
-            found += [(f"now and with {each.name} = {each.value:.4g}", each.parting) for each in others]
+            found += [
+                (f"now and with {each.name} = {each.value:.4g}", each.parting) for each in others
+            ]
         pairs = [
             {
                 "title": f"{words} ({_numbers(one)}, seed {one.seed})",
@@ -176,11 +185,17 @@ class Player:
     def tick(self, now: float) -> None:
         """Updates the stage to `now`, s of a monotonic clock. Raises UserError for a damaged run file."""
         # A killed engine leaves its rows behind. Read rows before events, so that their tests are known.
-        self._live = self._run.live() if self._wanted.at is None and engine_is_alive(self._run.path) else []
+        self._live = (
+            self._run.live() if self._wanted.at is None and engine_is_alive(self._run.path) else []
+        )
         self._position.catch_up()
         row = made_for(self._state, self._wanted)
         idle = now - self._ran_at
-        following = shot_of(self._state, row, self._live) if row else shot(self._state, self._live, self._shot, idle)
+        following = (
+            shot_of(self._state, row, self._live)
+            if row
+            else shot(self._state, self._live, self._shot, idle)
+        )
         if any(row.test == following.test for row in self._live):
             self._ran_at = now
         if self._state.evidence_test != self._evidence:
@@ -227,7 +242,12 @@ class Player:
 
     def _caption(self, shot: Shot, time: str) -> None:
         models = f"{len(shot.models)} of {len(self._elements)} models"
-        here = {"kind": shot.kind, "test": shot.test, "parts": self._letters, "limit": self._timeout}
+        here = {
+            "kind": shot.kind,
+            "test": shot.test,
+            "parts": self._letters,
+            "limit": self._timeout,
+        }
         self._say(name=self._name, title=shot.title, models=models, time=time, **here)
 
     def _show_parts(self) -> None:
@@ -238,7 +258,8 @@ class Player:
             return
         self._parts = parts
         groups = [
-            (partition_letter(number), colors.of_bytes(HUES[number % len(HUES)]), names) for number, names in parts
+            (partition_letter(number), colors.of_bytes(HUES[number % len(HUES)]), names)
+            for number, names in parts
         ]
         self._letters = self._scenery.parts(groups)
         if self._shot is not None:
@@ -246,7 +267,11 @@ class Player:
 
 
 def _numbers(one: Parting) -> str:
-    return f"tests {one.with_test} and {one.without_test}" if one.without_test > 0 else f"test {one.with_test}"
+    return (
+        f"tests {one.with_test} and {one.without_test}"
+        if one.without_test > 0
+        else f"test {one.with_test}"
+    )
 
 
 def _row(time: float, pose: Pose) -> list[float]:

@@ -72,9 +72,21 @@ class Server:
         routes: list[Any] = [
             (f"/{self.token}/feed", _Feed, {"server": self}),
             (f"/{self.token}/", _Page, {"server": self}),
-            (rf"/{self.token}/(main\.min\.js)", tornado.web.StaticFileHandler, {"path": str(_VIEWER)}),
-            (rf"/{self.token}/(playback\.js)", tornado.web.StaticFileHandler, {"path": str(_PAGE.parent)}),
-            (rf"/{self.token}/(pairs|play|still|way|ghost-way)(?:/(-?\d{{1,9}}))?", _Asked, {"server": self}),
+            (
+                rf"/{self.token}/(main\.min\.js)",
+                tornado.web.StaticFileHandler,
+                {"path": str(_VIEWER)},
+            ),
+            (
+                rf"/{self.token}/(playback\.js)",
+                tornado.web.StaticFileHandler,
+                {"path": str(_PAGE.parent)},
+            ),
+            (
+                rf"/{self.token}/(pairs|play|still|way|ghost-way)(?:/(-?\d{{1,9}}))?",
+                _Asked,
+                {"server": self},
+            ),
             (rf"/alive/{name_of(self.token)}/([0-9a-f]{{32}})", _Alive, {"server": self}),
         ]
         application = tornado.web.Application(
@@ -159,7 +171,11 @@ class _Asked(_Handler):
             else:
                 self.set_header("Content-Type", "application/octet-stream")
                 # Each message after its length in 4 bytes.
-                self.finish(b"".join(len(one).to_bytes(4, "big") + one for one in player.drawings(what, test)))
+                self.finish(
+                    b"".join(
+                        len(one).to_bytes(4, "big") + one for one in player.drawings(what, test)
+                    )
+                )
         except UserError as error:
             self.set_status(404)
             self.set_header("Content-Type", "text/plain; charset=utf-8")

@@ -28,9 +28,13 @@ class Shot:
     title: str
 
 
-def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, idle: float = math.inf) -> Shot:
+def shot(
+    state: RunState, live: Sequence[Live], previous: Shot | None = None, idle: float = math.inf
+) -> Shot:
     """What to show, `idle` s after a test was last running. Stays with the `previous` test while it runs."""
-    running = [test for test in state.tests_of(row.test for row in live) if test.outcome == "running"]
+    running = [
+        test for test in state.tests_of(row.test for row in live) if test.outcome == "running"
+    ]
     before = previous if previous is not None and previous.kind == "live" else None
     if running:
         same = (test for test in running if before is not None and test.id == before.test)
@@ -61,7 +65,9 @@ def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Sh
     return shot_of_test(state, kind, test, row)
 
 
-def shot_of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial | None = None) -> Shot:
+def shot_of_test(
+    state: RunState, kind: str, test: Test, row: Candidate | Trial | None = None
+) -> Shot:
     """What to show of a test, which belongs to `state`, and was made for `row` if that is given."""
     name = purpose(state, test) if row is None else row.label
     models = frozenset(state.models_of(test))
@@ -77,4 +83,11 @@ def shot_of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial 
 
 def _shot(state: RunState, kind: str, test: int | None, models: frozenset[str], title: str) -> Shot:
     kept = frozenset(state.environment)
-    return Shot(kind=kind, test=test, models=models, left_out=kept - models, removed=frozenset(state.elements) - kept - models, title=title)
+    return Shot(
+        kind=kind,
+        test=test,
+        models=models,
+        left_out=kept - models,
+        removed=frozenset(state.elements) - kept - models,
+        title=title,
+    )

@@ -39,14 +39,23 @@ class Stage:
     def draw_json(self, path: Path, thing: Data) -> None:
         """Like `draw`, for a three.js object without geometry and material, such as a light."""
         metadata = {"version": 4.5, "type": "Object"}
-        self._keep(path, "object", {"type": "set_object", "object": {"metadata": metadata, "object": thing}})
+        self._keep(
+            path,
+            "object",
+            {"type": "set_object", "object": {"metadata": metadata, "object": thing}},
+        )
 
     def move(self, path: Path, pose: Pose, *, newest_only: bool = False) -> None:
         """Places everything at and below `path`."""
         matrix = np.eye(4)
         matrix[:3, :3] = pose.rotation()
         matrix[:3, 3] = pose.position
-        self._keep(path, "transform", {"type": "set_transform", "matrix": matrix.T.ravel().tolist()}, newest_only)
+        self._keep(
+            path,
+            "transform",
+            {"type": "set_transform", "matrix": matrix.T.ravel().tolist()},
+            newest_only,
+        )
 
     def show(self, path: Path, visible: bool) -> None:
         """Shows or hides everything at and below `path`."""
@@ -54,7 +63,9 @@ class Stage:
 
     def set(self, path: Path, name: str, value: Any) -> None:
         """Sets a property of the object at `path`."""
-        self._keep(path, f"property {name}", {"type": "set_property", "property": name, "value": value})
+        self._keep(
+            path, f"property {name}", {"type": "set_property", "property": name, "value": value}
+        )
 
     def delete(self, path: Path) -> None:
         """Deletes everything at and below `path`."""
@@ -66,12 +77,19 @@ class Stage:
 
     def drawn(self, path: Path, thing: Object | None) -> bytes:
         """The message that draws `thing` at `path`, or None deletes what is there, for one browser alone: it is not kept."""
-        command = {"type": "delete"} if thing is None else {"type": "set_object", "object": thing.lower()}
+        command = (
+            {"type": "delete"} if thing is None else {"type": "set_object", "object": thing.lower()}
+        )
         return bytes(umsgpack.packb(command | {"path": _text(path)}))
 
     def messages(self) -> list[bytes]:
         """The messages that a new browser needs, objects before their properties."""
-        return [message for (_, kind), message in sorted(self._kept.items(), key=lambda item: item[0][1] != "object")]
+        return [
+            message
+            for (_, kind), message in sorted(
+                self._kept.items(), key=lambda item: item[0][1] != "object"
+            )
+        ]
 
     def _keep(self, path: Path, kind: str, command: Data, newest_only: bool = False) -> None:
         message = umsgpack.packb(command | {"path": _text(path)})

@@ -62,11 +62,17 @@ class Wheels:
         joints = () if self._drive is None else self._drive.joints
         driven = (joint for joint in self._robot.joints if joint.name in joints)
         turned = {link.name for joint in driven for link in wheel_links(self._robot, joint)}
-        return replace(self._robot, links=tuple(link for link in self._robot.links if link.name not in turned))
+        return replace(
+            self._robot, links=tuple(link for link in self._robot.links if link.name not in turned)
+        )
 
     def turned(self, rows: np.ndarray) -> np.ndarray:
         """How far left and right wheels have turned at each row of a motion, shape (N, 2), rad; see `rolled`."""
-        return np.zeros((len(rows), 2)) if self._drive is None else rolled(self._robot, self._drive, self._skid, rows)
+        return (
+            np.zeros((len(rows), 2))
+            if self._drive is None
+            else rolled(self._robot, self._drive, self._skid, rows)
+        )
 
     def data(self) -> list[Data]:
         return [{"key": each.key, "axis": list(each.axis), "side": each.side} for each in self.all]
@@ -74,7 +80,9 @@ class Wheels:
     def _made(self, drive: Drive) -> Iterator[Wheel]:
         joints = {joint.name: joint for joint in self._robot.joints}
         to_first = self._robot.links[0].pose.inverse()
-        for number, (name, left, sign) in enumerate(zip(drive.joints, drive.left, drive.signs, strict=True)):
+        for number, (name, left, sign) in enumerate(
+            zip(drive.joints, drive.left, drive.signs, strict=True)
+        ):
             joint = joints[name]
             links = replace(self._robot, links=tuple(wheel_links(self._robot, joint)))
             x, y, z = (sign * part for part in to_first.rotate(joint.axis))
@@ -93,4 +101,10 @@ class Wheels:
             bars = [mesh.box(size).at(at) for size in ((long, width, thick), (thick, width, long))]
             spokes = mesh.merge(bars).painted(SPOKE_COLOR)
             whole = replace(mesh.merge([wheel, spokes]), alpha=1.0)
-            yield Wheel(key=f"wheel {number}", painted=whole, position=place, axis=(x, y, z), side=0 if left else 1)
+            yield Wheel(
+                key=f"wheel {number}",
+                painted=whole,
+                position=place,
+                axis=(x, y, z),
+                side=0 if left else 1,
+            )

@@ -52,12 +52,16 @@ class Work:
             create_run(cell.scenario, self.path)
         self.file = RunFile(self.path)
         self.before = self.state = fold(self.file.events())
-        self.engine = start_engine(self.path, workers, accept_mode="automatic", share=self.path.parent)
+        self.engine = start_engine(
+            self.path, workers, accept_mode="automatic", share=self.path.parent
+        )
 
     @property
     def tests(self) -> int:
         """How many tests this session has made, and not reused from another cell."""
-        now, then = (each.made - sum(test.taken for test in each.tests) for each in (self.state, self.before))
+        now, then = (
+            each.made - sum(test.taken for test in each.tests) for each in (self.state, self.before)
+        )
         return now - then
 
     def catch_up(self) -> None:
@@ -87,7 +91,9 @@ def is_done(folder: Path, cell: Cell) -> bool:
     except UserError as error:
         raise UserError(f"{error}; delete that file, or choose another folder with -o") from None
     if other:
-        raise UserError(f"{path}: was made with {other}; choose another folder with -o, or delete {path.parent}")
+        raise UserError(
+            f"{path}: was made with {other}; choose another folder with -o, or delete {path.parent}"
+        )
     if state.status != "finished" or engine_is_alive(path):
         return False
     # Where the baseline, or a claim of the certificate, is open since tests broke, an engine makes them again.
@@ -102,7 +108,9 @@ class Runner:
     it is. Raises UserError if earlier sessions cannot be read.
     """
 
-    def __init__(self, plan: Plan, folder: Path, cells: Sequence[Cell], jobs: int, out: TextIO) -> None:
+    def __init__(
+        self, plan: Plan, folder: Path, cells: Sequence[Cell], jobs: int, out: TextIO
+    ) -> None:
         self._plan = plan
         self._folder = folder
         self._jobs = jobs
@@ -112,7 +120,14 @@ class Runner:
         self._out = out
         self._live = out.isatty() and os.environ.get("TERM") != "dumb"
         self._earlier = sessions(folder)
-        self._session = Session(begun=time.time(), seconds=0.0, jobs=jobs, tests=0, versions=versions(), machine=machine())
+        self._session = Session(
+            begun=time.time(),
+            seconds=0.0,
+            jobs=jobs,
+            tests=0,
+            versions=versions(),
+            machine=machine(),
+        )
         self._began = self._next_record = time.monotonic()
         self._next_line = self._began + QUIET
 
@@ -123,11 +138,18 @@ class Runner:
         then stops the engines, too.
         """
         # Ignored signals stay ignored: a study under nohup outlives its terminal.
-        asked = [number for number in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(number) != signal.SIG_IGN]
+        asked = [
+            number
+            for number in (signal.SIGTERM, signal.SIGHUP)
+            if signal.getsignal(number) != signal.SIG_IGN
+        ]
         handlers = [(number, signal.signal(number, signal.default_int_handler)) for number in asked]
         try:
             while self._waiting or self.running:
-                while self._waiting and (free := self._jobs - sum(work.workers for work in self.running)) > 0:
+                while (
+                    self._waiting
+                    and (free := self._jobs - sum(work.workers for work in self.running)) > 0
+                ):
                     # Free workers are shared among the waiting cells.
                     workers = max(min(PER_CELL, free), free // len(self._waiting))
                     self.running.append(Work(self._folder, self._waiting.pop(0), workers))
@@ -141,7 +163,9 @@ class Runner:
             # They record it; also those stop that an earlier, killed study left.
             stop_engines([(work.file, work.engine) for work in self.running])
             deadline = time.monotonic() + STOP_WAIT
-            while time.monotonic() < deadline and any(engine_is_alive(work.path) for work in self.running):
+            while time.monotonic() < deadline and any(
+                engine_is_alive(work.path) for work in self.running
+            ):
                 time.sleep(POLL)
             for work in self.running:
                 work.catch_up()
@@ -163,7 +187,9 @@ class Runner:
         if not came_to:
             result = read_cell(self._folder, work.cell)
             doubt = "" if result.minimal else f"; not certified: {result.problem}"
-            tests = f"{count(result.tests, 'test')} and {result.certificate_tests} for the certificate"
+            tests = (
+                f"{count(result.tests, 'test')} and {result.certificate_tests} for the certificate"
+            )
             models = f"{len(result.elements)} → {count(len(result.left), 'model')}"
             came_to = f"{models}, {tests}, {duration(work.state.working_seconds)}{doubt}"
             if result.baseline is None:
@@ -191,7 +217,9 @@ class Runner:
     def _record(self) -> None:
         seconds = time.monotonic() - self._began
         tests = sum(work.tests for work in (*self.running, *self._ended))
-        write_sessions(self._folder, (*self._earlier, replace(self._session, seconds=seconds, tests=tests)))
+        write_sessions(
+            self._folder, (*self._earlier, replace(self._session, seconds=seconds, tests=tests))
+        )
 
     def _say(self, line: str) -> None:
         print(f"{CLEAR if self._live else ''}{printable(line)}", file=self._out, flush=True)
@@ -228,9 +256,16 @@ def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
         page, results = write_study(plan, folder, sessions(folder))
     for result in results:
         if result.problem and result.cell.name in done:
-            print(printable(f"{result.cell.label}, seed {result.cell.seed}: {result.problem}"), file=out)
+            print(
+                printable(f"{result.cell.label}, seed {result.cell.seed}: {result.problem}"),
+                file=out,
+            )
     minimal = sum(result.minimal for result in results)
-    print(printable(f"{minimal} of {count(len(results), 'cell')} certified; wrote {page}"), file=out, flush=True)
+    print(
+        printable(f"{minimal} of {count(len(results), 'cell')} certified; wrote {page}"),
+        file=out,
+        flush=True,
+    )
     if interrupted:
         print("interrupted; the same command continues", file=sys.stderr)
         return 130

@@ -32,8 +32,15 @@ def opened(folder: Path) -> Iterator[None]:
     try:
         if folder.exists() and not folder.is_dir():
             raise UserError(f"{folder}: is a file; give the name of a folder")
-        if folder.is_dir() and any(folder.iterdir()) and not (folder / ABOUT).exists() and not (folder / LOCK).exists():
-            raise UserError(f"{folder}: contains other files; give the name of a new or empty folder")
+        if (
+            folder.is_dir()
+            and any(folder.iterdir())
+            and not (folder / ABOUT).exists()
+            and not (folder / LOCK).exists()
+        ):
+            raise UserError(
+                f"{folder}: contains other files; give the name of a new or empty folder"
+            )
         (folder / RUNS).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"{refused}: {error.strerror}; {instead}") from None

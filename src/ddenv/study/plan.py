@@ -21,7 +21,11 @@ from ddenv.world.scenario import Scenario
 
 # The scenarios and the pairs of the paper's Tables II to IV, in their order.
 SCENARIOS = ("ditch", "rubble", "friction")
-PAIRS = ("model2model/failure-proximal", "model2model/avg-trajectory-proximal", "timeseg/avg-trajectory-proximal")
+PAIRS = (
+    "model2model/failure-proximal",
+    "model2model/avg-trajectory-proximal",
+    "timeseg/avg-trajectory-proximal",
+)
 # A seed is less.
 MOST_SEED = 2**31
 # Between the seeds of a scenario. Run i has seed + i: the search has few runs, certificates have those from `FIRST_FRESH_RUN` on.
@@ -45,7 +49,9 @@ class Method:
     def parts(self) -> tuple[str, str]:
         """The partitioning and the prioritization, "" for a part that the algorithm does not use."""
         parts = dict(zip(schemas.BOTH, self.pair.split("/"), strict=True))
-        partitioning, prioritization = (parts[k] if k in schemas.uses(self.algorithm) else "" for k in schemas.BOTH)
+        partitioning, prioritization = (
+            parts[k] if k in schemas.uses(self.algorithm) else "" for k in schemas.BOTH
+        )
         return partitioning, prioritization
 
     @property
@@ -70,7 +76,12 @@ class Cell:
     @property
     def name(self) -> str:
         """The name of its run file, without the ending."""
-        words = (self.method.algorithm, *self.method.used, f"seed-{self.seed}", *(["slices"] if self.slices else []))
+        words = (
+            self.method.algorithm,
+            *self.method.used,
+            f"seed-{self.seed}",
+            *(["slices"] if self.slices else []),
+        )
         return "_".join((file_name(self.scenario), *(NO_NAME.sub("-", word) for word in words)))
 
     @property
@@ -126,23 +137,36 @@ class Plan:
 
 
 def make_plan(
-    scenarios: Sequence[str] = (), pairs: str = "paper", algorithms: str = "ddenv", seeds: int = 1, **options: Any
+    scenarios: Sequence[str] = (),
+    pairs: str = "paper",
+    algorithms: str = "ddenv",
+    seeds: int = 1,
+    **options: Any,
 ) -> Plan:
     """The study of these words; each may hold several names separated by commas. Raises UserError.
 
     `options` are those of `ddenv.runs.subject.with_options` for all of it.
     """
-    chosen_pairs = _chosen("--pairs", pairs, schemas.split_pair, {"paper": PAIRS, "all": schemas.pairs()})
+    chosen_pairs = _chosen(
+        "--pairs", pairs, schemas.split_pair, {"paper": PAIRS, "all": schemas.pairs()}
+    )
     known = {"all": schemas.names("algorithm")}
-    chosen_algorithms = _chosen("--algorithms", algorithms, partial(schemas.check, "algorithm"), known)
-    loaded = tuple(with_options(load_scenario(find_scenario(name)), **options) for name in scenario_names(scenarios))
+    chosen_algorithms = _chosen(
+        "--algorithms", algorithms, partial(schemas.check, "algorithm"), known
+    )
+    loaded = tuple(
+        with_options(load_scenario(find_scenario(name)), **options)
+        for name in scenario_names(scenarios)
+    )
     # Methods that use the same parts are the same.
     methods: dict[Names, Method] = {}
     for method in (Method(*parts) for parts in product(chosen_algorithms, chosen_pairs)):
         methods.setdefault((method.algorithm, *method.used), method)
     plan = Plan(loaded, tuple(methods.values()), seeds)
     if len({cell.name for cell in plan.cells}) < len(plan.cells):
-        raise UserError("--scenarios: the names of two of them make the same file names; give each a name of its own")
+        raise UserError(
+            "--scenarios: the names of two of them make the same file names; give each a name of its own"
+        )
     return plan
 
 
@@ -158,12 +182,18 @@ def _names(option: str, words: str) -> Names:
     return names
 
 
-def _chosen(option: str, words: str, check: Callable[[str], object], groups: Mapping[str, Sequence[str]]) -> Names:
+def _chosen(
+    option: str, words: str, check: Callable[[str], object], groups: Mapping[str, Sequence[str]]
+) -> Names:
     """The names in `words`, each once; that of a group stands for all in it. Raises UserError."""
-    names = tuple(dict.fromkeys(name for word in _names(option, words) for name in groups.get(word, (word,))))
+    names = tuple(
+        dict.fromkeys(name for word in _names(option, words) for name in groups.get(word, (word,)))
+    )
     for name in names:
         try:
             check(name)
         except UserError as error:
-            raise UserError(f"{option}: {error}; or give {' or '.join(map(repr, groups))}") from None
+            raise UserError(
+                f"{option}: {error}; or give {' or '.join(map(repr, groups))}"
+            ) from None
     return names

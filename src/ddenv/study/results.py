@@ -45,14 +45,20 @@ def difference(file: RunFile, cell: Cell) -> str:
         return "another scenario, or with other options"
     if file.document("world") != read_bytes(cell.scenario.world):
         return "another world"
-    return "" if file.document("robot") == read_bytes(cell.scenario.robot.model) else "another robot"
+    return (
+        "" if file.document("robot") == read_bytes(cell.scenario.robot.model) else "another robot"
+    )
 
 
 def _compared(scenario: object) -> object:
     """A scenario without its description and paths: a study may continue in another folder."""
     if not isinstance(scenario, dict):
         return None
-    kept = {key: value for key, value in scenario.items() if key not in ("description", "world", "folder")}
+    kept = {
+        key: value
+        for key, value in scenario.items()
+        if key not in ("description", "world", "folder")
+    }
     for part, key in (("robot", "model"), ("reading", "model_path")):
         if isinstance(kept.get(part), dict):
             kept[part] = {name: value for name, value in kept[part].items() if name != key}
@@ -110,7 +116,9 @@ class Result:
         with others that are not left, with `misses` tests each.
         """
         shown_once = int(len(self.left) < len(self.elements))
-        return self.cell.scenario.reduction.baseline_runs + shown_once + len(self.left) * self.misses
+        return (
+            self.cell.scenario.reduction.baseline_runs + shown_once + len(self.left) * self.misses
+        )
 
 
 def read_cell(folder: Path, cell: Cell) -> Result:
@@ -149,13 +157,25 @@ def _read(file: RunFile, cell: Cell) -> Result:
         if isinstance(event, BaselineFinished | Reduced | RateLost | LeftOut | Finished):
             sizes.append((len(search), len(state.environment)))
     if not all(0 < number <= len(state.tests) for number in (*search, *fresh)):
-        raise UserError(f"{file.path}: damaged run file: a verdict relies on tests that are missing")
+        raise UserError(
+            f"{file.path}: damaged run file: a verdict relies on tests that are missing"
+        )
     tests, fresh_tests = ([state.test(number) for number in numbers] for numbers in (search, fresh))
     certificate = current(state) if state.status == "finished" else None
     minimal = state.minimal and certificate is not None and is_minimal(certificate)
-    problem = "it has no certificate" if state.minimal else state.reason if state.ended else "has not ended"
+    problem = (
+        "it has no certificate"
+        if state.minimal
+        else state.reason
+        if state.ended
+        else "has not ended"
+    )
     # A certificate runs the whole world only where what is left missed f: its runs would show the rate as too low.
-    whole = [test.outcome for test in tests if test.environment == 0 and test.outcome in ("similar", "other", "pass")]
+    whole = [
+        test.outcome
+        for test in tests
+        if test.environment == 0 and test.outcome in ("similar", "other", "pass")
+    ]
     return Result(
         cell=cell,
         ended=state.ended,
@@ -201,7 +221,11 @@ def paper_row(cell: Cell) -> Paper | None:
     """The paper's numbers for a cell; None if it has none. It knows no slices."""
     table = TABLES.get(cell.scenario.name, {"rows": {}})
     row = table["rows"].get(cell.method.pair)
-    return Paper(table["table"], **row) if row and cell.method.algorithm == "ddenv" and not cell.slices else None
+    return (
+        Paper(table["table"], **row)
+        if row and cell.method.algorithm == "ddenv" and not cell.slices
+        else None
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,7 +279,11 @@ def rows_of(plan: Plan, results: Sequence[Result]) -> tuple[tuple[Row, ...], ...
         found[result.cell.scenario.name, result.cell.method, result.cell.slices].append(result)
     return tuple(
         tuple(
-            Row(scenario, method, *(tuple(found[scenario.name, method, slices]) for slices in (False, True)))
+            Row(
+                scenario,
+                method,
+                *(tuple(found[scenario.name, method, slices]) for slices in (False, True)),
+            )
             for method in plan.methods
         )
         for scenario in plan.scenarios

@@ -43,7 +43,15 @@ OF_A_CELL = ("algorithm", "pair", "seed", "budget", "slice")
 # Numbers of a cell in the table for programs.
 TIMES = ("seconds", "certificate_seconds")
 COUNTED = (
-    *("tests", "simulated", "reruns", "certificate_tests", "certificate_simulated", "ahead", "taken_over"),
+    *(
+        "tests",
+        "simulated",
+        "reruns",
+        "certificate_tests",
+        "certificate_simulated",
+        "ahead",
+        "taken_over",
+    ),
     *TIMES,
     "steps_back",
 )
@@ -51,7 +59,9 @@ COUNTED = (
 COLUMNS = Path(__file__).with_name("columns.yaml")
 
 
-def content(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], folder: Path) -> Report:
+def content(
+    plan: Plan, results: Sequence[Result], sessions: Sequence[Session], folder: Path
+) -> Report:
     """The page of a study; `results` are those of the plan's cells in their order."""
     scenarios = rows_of(plan, results)
     minimal = [result for result in results if result.minimal]
@@ -62,7 +72,11 @@ def content(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], 
     figures = [(f"{len(minimal)} of {len(results)}", "certified")]
     if minimal:
         smaller = percent(mean(result.smaller for result in minimal))
-        worlds = "Every world is" if len(minimal) == len(results) else f"{len(minimal)} of {len(results)} worlds are"
+        worlds = (
+            "Every world is"
+            if len(minimal) == len(results)
+            else f"{len(minimal)} of {len(results)} worlds are"
+        )
         verdict = f"{worlds} minimal: {smaller} smaller on average"
         figures.append((smaller, "smaller, mean"))
     figures += [
@@ -73,13 +87,19 @@ def content(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], 
         jobs = sorted({session.jobs for session in sessions})
         workers = count(jobs[0], "worker") if len(jobs) == 1 else f"{jobs[0]} to {jobs[-1]} workers"
         made = thousands(sum(session.tests for session in sessions))
-        figures.append((duration(sum(session.seconds for session in sessions)), f"with {workers}, {made} made"))
+        figures.append(
+            (duration(sum(session.seconds for session in sessions)), f"with {workers}, {made} made")
+        )
     return Report(
         name="ddenv study",
         verdict=verdict,
         lead=tuple(_lead(results, minimal)),
         figures=tuple(figures),
-        sections=(*([ranking] if ranking else []), *sections, making(plan, results, sessions, folder)),
+        sections=(
+            *([ranking] if ranking else []),
+            *sections,
+            making(plan, results, sessions, folder),
+        ),
         foot=f"Written by ddenv {__version__}. Lengths in m, times in UTC.",
     )
 
@@ -93,12 +113,16 @@ def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Para
         f"it keeps at least {' or '.join(map(percent_at_least, shares))} of the whole world's failure rate, and less without "
         "any one of its models."
     )
-    beside = [(result, paper) for result in minimal if (paper := paper_row(result.cell)) is not None]
+    beside = [
+        (result, paper) for result in minimal if (paper := paper_row(result.cell)) is not None
+    ]
     if beside:
         better = sum(result.smaller >= paper.smaller for result, paper in beside)
         fewer = sum(result.tests <= paper.tests for result, paper in beside)
         hours = sum(paper.minutes for _, paper in beside) / 60
-        ours, more = (duration(sum(getattr(result, time) for result, _ in beside)) for time in TIMES)
+        ours, more = (
+            duration(sum(getattr(result, time) for result, _ in beside)) for time in TIMES
+        )
         yield say(
             f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, no more "
             f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take {ours}, and the certificates {more}. "
@@ -108,7 +132,9 @@ def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Para
         yield say(f"{count(missing, 'cell')} not certified: the tables say why.", notice=True)
 
 
-def write_study(plan: Plan, folder: Path, sessions: Sequence[Session]) -> tuple[Path, tuple[Result, ...]]:
+def write_study(
+    plan: Plan, folder: Path, sessions: Sequence[Session]
+) -> tuple[Path, tuple[Result, ...]]:
     """Writes `study.html`, `study.md` with its figures, and `study.csv`; returns the page and its results. Raises UserError."""
     results = tuple(read_cell(folder, cell) for cell in plan.cells)
     report = content(plan, results, sessions, folder)
@@ -135,7 +161,9 @@ def _row(folder: Path, result: Result) -> dict[str, object]:
     paper = paper_row(result.cell)
     partitioning, prioritization = cell.method.parts
     left, *removals = result.certificate.claims if result.certificate is not None else (None,)
-    most = max((claim.shown / claim.runs for claim in removals if claim and claim.runs), default=None)
+    most = max(
+        (claim.shown / claim.runs for claim in removals if claim and claim.runs), default=None
+    )
     return {
         "scenario": cell.scenario.name,
         "algorithm": cell.method.algorithm,
@@ -171,13 +199,20 @@ def _row(folder: Path, result: Result) -> dict[str, object]:
     }
 
 
-def making(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], folder: Path) -> Section:
+def making(
+    plan: Plan, results: Sequence[Result], sessions: Sequence[Session], folder: Path
+) -> Section:
     # A name that begins with a dash would be an option.
     start = f"./{folder}" if str(folder).startswith("-") else folder
     example = shlex.quote(plain(f"{start}/{RUNS}/{plan.cells[0].name}.ddenv"))
     worked = [
         (
-            *(f"{moment(session.begun)} UTC", duration(session.seconds), str(session.jobs), thousands(session.tests)),
+            *(
+                f"{moment(session.begun)} UTC",
+                duration(session.seconds),
+                str(session.jobs),
+                thousands(session.tests),
+            ),
             *(Name(session.machine), Name(session.versions)),
         )
         for session in sessions
@@ -198,13 +233,22 @@ def making(plan: Plan, results: Sequence[Result], sessions: Sequence[Session], f
 def _settings(plan: Plan) -> Table:
     used = {part for method in plan.methods for part in (method.algorithm, *method.parts)}
     rows = [
-        (item.label, *(value_words(getattr(getattr(scenario, item.section), item.name)) for scenario in plan.scenarios))
+        (
+            item.label,
+            *(
+                value_words(getattr(getattr(scenario, item.section), item.name))
+                for scenario in plan.scenarios
+            ),
+        )
         for item in SETTINGS.values()
         if item.section != "simulation"
         and item.name not in OF_A_CELL
         and (not item.used_by or used & set(item.used_by))
     ]
-    seeds = ({cell.seed for cell in plan.cells if cell.scenario.name == scenario.name} for scenario in plan.scenarios)
+    seeds = (
+        {cell.seed for cell in plan.cells if cell.scenario.name == scenario.name}
+        for scenario in plan.scenarios
+    )
     rows.append(("seeds", *(", ".join(map(str, sorted(numbers))) for numbers in seeds)))
     head = ("setting", *(plain(scenario.name) for scenario in plan.scenarios))
     return Table(head, tuple(rows), range(1, len(head)))
@@ -212,7 +256,9 @@ def _settings(plan: Plan) -> Table:
 
 def _computed(results: Sequence[Result]) -> Iterator[Block]:
     # Tests of different versions may differ.
-    drake = [result for result in results if result.simulator and result.cell.scenario.oracle is None]
+    drake = [
+        result for result in results if result.simulator and result.cell.scenario.oracle is None
+    ]
     versions = sorted({f"ddenv {result.version}, {result.simulator}" for result in drake})
     taken = sum(result.taken_over for result in results)
     if len(versions) == 1:

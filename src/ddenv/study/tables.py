@@ -11,7 +11,19 @@ from statistics import geometric_mean
 
 from ddenv.errors import UserError
 from ddenv.evidence.rates import anytime_interval
-from ddenv.page.blocks import Block, Cell, Paragraph, Part, Picture, Section, Strong, Table, named, percent, say
+from ddenv.page.blocks import (
+    Block,
+    Cell,
+    Paragraph,
+    Part,
+    Picture,
+    Section,
+    Strong,
+    Table,
+    named,
+    percent,
+    say,
+)
 from ddenv.page.step_chart import LEFT, axes, opening, path, scale, steps
 from ddenv.report.report_map import picture
 from ddenv.report.run_data import read_run
@@ -71,17 +83,25 @@ def chart(rows: Sequence[Row]) -> str:
         for result in row.over:
             corners = steps(result.sizes)
             title = escape(f"{plain(result.cell.label)}, seed {result.cell.seed}")
-            lines.append(f'<path class="{look}"{wide} d="M{path(corners, at)}"><title>{title}</title></path>')
+            lines.append(
+                f'<path class="{look}"{wide} d="M{path(corners, at)}"><title>{title}</title></path>'
+            )
             if width:
                 x, y = at(*corners[-1])
-                lines.append(f'<circle class="{look} tip" cx="{x:.1f}" cy="{y:.1f}" r="{1.5 + width / 2:g}"/>')
-    legend = [(look, wide, escape(plain(_line_end(row)))) for look, wide, _, row in looks[len(others) :]]
+                lines.append(
+                    f'<circle class="{look} tip" cx="{x:.1f}" cy="{y:.1f}" r="{1.5 + width / 2:g}"/>'
+                )
+    legend = [
+        (look, wide, escape(plain(_line_end(row)))) for look, wide, _, row in looks[len(others) :]
+    ]
     legend += [("faint", "", count(len(others), "other method"))] if others else []
     for number, (look, wide, words) in enumerate(legend):
         y = HEIGHT + 4 + LINE * number
         lines.append(f'<path class="{look}"{wide} d="M{LEFT} {y:.1f}h{SAMPLE}"/>')
         lines.append(f'<text class="tick" x="{LEFT + SAMPLE + 10}" y="{y + 4:.1f}">{words}</text>')
-    return "\n".join([opening(HEIGHT + LINE * len(legend) + 4), *axes(at, last, most), *lines, "</svg>"])
+    return "\n".join(
+        [opening(HEIGHT + LINE * len(legend) + 4), *axes(at, last, most), *lines, "</svg>"]
+    )
 
 
 def _line_end(row: Row) -> str:
@@ -97,14 +117,20 @@ def worlds(folder: Path, rows: Sequence[Row], file: str) -> Iterator[Block]:
     ends = defaultdict[Names, list[Result]](list)
     for result in over(rows):
         ends[result.left].append(result)
-    ranked = sorted(ends.items(), key=lambda end: (-sum(result.minimal for result in end[1]), -len(end[1])))
+    ranked = sorted(
+        ends.items(), key=lambda end: (-sum(result.minimal for result in end[1]), -len(end[1]))
+    )
     for number, (left, results) in enumerate(ranked[:MOST_WORLDS], start=1):
         minimal = any(result.minimal for result in results)
         what = "The minimal world" if minimal else "What is left, not shown to be minimal"
-        of_them = f", the end of {len(results)} of {len(over(rows))} cells" if len(over(rows)) > 1 else ""
+        of_them = (
+            f", the end of {len(results)} of {len(over(rows))} cells" if len(over(rows)) > 1 else ""
+        )
         these = named(left, MOST_LEFT) or ("nothing that can be removed",)
         yield say(f"{what} (the paper's Figure 3){of_them}: ", *these, ".")
-        yield _map(folder, results[0], f"figure-3-{file}" + (f".{number}" if len(ranked) > 1 else ""))
+        yield _map(
+            folder, results[0], f"figure-3-{file}" + (f".{number}" if len(ranked) > 1 else "")
+        )
     if len(ranked) > MOST_WORLDS:
         yield say(f"And {count(len(ranked) - MOST_WORLDS, 'more world')} that fewer cells found.")
 
@@ -172,7 +198,10 @@ def _numbers(row: Row, beside: bool, slices: bool) -> Iterator[tuple[str, Cell]]
     yield "search minutes", spread([result.seconds / 60 for result in results], "{:.1f}".format)
     if beside:
         yield "paper", str(paper.minutes) if paper else "–"
-    yield "certificate minutes", spread([result.certificate_seconds / 60 for result in results], "{:.1f}".format)
+    yield (
+        "certificate minutes",
+        spread([result.certificate_seconds / 60 for result in results], "{:.1f}".format),
+    )
 
 
 def _whole(value: float) -> str:
@@ -185,16 +214,26 @@ def behind(rows: Sequence[Row]) -> Table:
 
 
 def _behind(row: Row) -> Iterator[tuple[str, Cell]]:
-    claims = [claim for result in row.over if result.certificate for claim in result.certificate.claims]
+    claims = [
+        claim for result in row.over if result.certificate for claim in result.certificate.claims
+    ]
     left = [(claim.shown, claim.runs) for claim in claims if claim.without is None]
     whole = [(result.whole_f, result.whole_runs) for result in row.results]
-    without = max((claim for claim in claims if claim.without), key=lambda claim: claim.high, default=None)
+    without = max(
+        (claim for claim in claims if claim.without), key=lambda claim: claim.high, default=None
+    )
     yield "method", row.method.label
-    yield "re-runs", spread([result.reruns / result.tests for result in row.over if result.tests], percent)
+    yield (
+        "re-runs",
+        spread([result.reruns / result.tests for result in row.over if result.tests], percent),
+    )
     yield "models left", _left(row.over)
     yield "f in the whole world", _rate(whole)
     yield "f in what is left", _rate(left)
-    yield "f without one of them", f"at most {_rate([(without.shown, without.runs)])}" if without else "–"
+    yield (
+        "f without one of them",
+        f"at most {_rate([(without.shown, without.runs)])}" if without else "–",
+    )
     yield "steps back", spread([result.steps_back for result in row.over], _whole)
     yield "fewest tests", "–" if row.bound is None else f"{row.bound:g}"
 
@@ -237,11 +276,23 @@ def best(scenarios: Sequence[Sequence[Row]]) -> Section | None:
     """All methods, the fewest tests first; None if too few were tried."""
     if len(scenarios[0]) < FEWEST or not any(row.minimal for rows in scenarios for row in rows):
         return None
-    fewest = [min((row.certain for row in rows if row.certain is not None), default=None) for rows in scenarios]
-    head = ("method", *(f"{plain(rows[0].scenario.name)}, tests" for rows in scenarios), "times the bound, mean")
+    fewest = [
+        min((row.certain for row in rows if row.certain is not None), default=None)
+        for rows in scenarios
+    ]
+    head = (
+        "method",
+        *(f"{plain(rows[0].scenario.name)}, tests" for rows in scenarios),
+        "times the bound, mean",
+    )
     # As a range, since cells may differ in how many models are left.
-    bounds = (sorted({result.bound for row in rows for result in row.minimal}) for rows in scenarios)
-    least = (" to ".join(map(str, dict.fromkeys((each[0], each[-1])))) if each else "–" for each in bounds)
+    bounds = (
+        sorted({result.bound for row in rows for result in row.minimal}) for rows in scenarios
+    )
+    least = (
+        " to ".join(map(str, dict.fromkeys((each[0], each[-1])))) if each else "–"
+        for each in bounds
+    )
     table: list[tuple[Cell, ...]] = [("minimum for a search that ends there", *least, "1.0")]
     ranked = []
     for rows in zip(*scenarios, strict=True):
@@ -249,7 +300,9 @@ def best(scenarios: Sequence[Sequence[Row]]) -> Section | None:
         ratios = [row.certain / row.bound for row in rows if row.certain is not None and row.bound]
         times = geometric_mean(ratios) if len(ratios) == len(rows) else math.inf
         cells = [_cell(row, few) for row, few in zip(rows, fewest, strict=True)]
-        ranked.append((times, (rows[0].method.label, *cells, f"{times:.1f}" if times < math.inf else "–")))
+        ranked.append(
+            (times, (rows[0].method.label, *cells, f"{times:.1f}" if times < math.inf else "–"))
+        )
     table += [row for _, row in sorted(ranked, key=lambda each: each[0])]
     return Section("Which is best where", (Table(head, table, range(1, len(head))), say(BOUNDS)))
 

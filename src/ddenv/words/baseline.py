@@ -24,7 +24,9 @@ def baseline(state: RunState) -> str:
     said = [f"Baseline: the robot {failed_in(state, found)} in {often}{broke}."]
     if found.alike and found.runs < settings(state).baseline_runs:
         said.append("These runs are alike to the last bit, so no more were made.")
-    if listed := [f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in found.others]:
+    if listed := [
+        f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in found.others
+    ]:
         others = f"other failures: {first_of(listed, MOST_FAILURES)}"
         f = next((one for one in found.seen if one.test == found.failure_test), None)
         if found.chose and f is not None:
@@ -52,5 +54,7 @@ def missed(state: RunState) -> str:
     middle, most = (percent(miss_chance(rate, asked.iterations)) for rate in (base.rate, base.low))
     chance = middle if middle == most else f"{middle} (at most {most})"
     rare = base.iterations_95 > asked.iterations
-    enough = f"; for a 95 % chance of seeing f, use --iterations {base.iterations_95}" if rare else ""
+    enough = (
+        f"; for a 95 % chance of seeing f, use --iterations {base.iterations_95}" if rare else ""
+    )
     return f"the chance that {count(1 + asked.iterations, 'run')} of a candidate miss f is {chance}{enough}"

@@ -23,7 +23,15 @@ from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import stack_with
-from ddenv.text import Sentences, between, count, first_of, percent, percent_at_least, percent_at_most
+from ddenv.text import (
+    Sentences,
+    between,
+    count,
+    first_of,
+    percent,
+    percent_at_least,
+    percent_at_most,
+)
 from ddenv.words.signs import metres
 
 MOST_NAMES = 3
@@ -37,9 +45,7 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     """
     left, *removals = certificate.claims
     if left.verdict == "lost":
-        return (
-            f"what is left keeps less than {percent(certificate.keep_rate)} of {_whole_rate(certificate)}: {rate(left)}"
-        )
+        return f"what is left keeps less than {percent(certificate.keep_rate)} of {_whole_rate(certificate)}: {rate(left)}"
     if left.verdict != "kept" and not certificate.seeds:
         aim = f"{percent_at_least(certificate.certify_rate)} of {_whole_rate(certificate)}"
         shown = f"; it keeps at least {percent_at_least(left.bound)}" if left.bound else ""
@@ -47,7 +53,9 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     verdicts = {str(claim.without): claim.verdict for claim in removals}
     if certificate.elsewhere is not None:
         return f"{_elsewhere(certificate.elsewhere)}; with everything that is left {rate(left)}"
-    if doubt := _doubt(verdicts, "not shown that each model is needed", "not minimal: f seems to show", "without"):
+    if doubt := _doubt(
+        verdicts, "not shown that each model is needed", "not minimal: f seems to show", "without"
+    ):
         return f"{doubt}; with everything that is left {rate(left)}"
     but = f"; {_stayed(pinned)}" if pinned else ""
     if certificate.seeds:
@@ -56,14 +64,16 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         return f"nothing is left that can be removed: {rate(left)}{but}"
     if helps := helping(certificate):
         first = next(claim for claim in removals if claim.without == helps[0])
-        return (
-            f"minimal but for {first_of(helps, MOST_NAMES)}: {kept(certificate)}; without {helps[0]} {rate(first)}{but}"
-        )
+        return f"minimal but for {first_of(helps, MOST_NAMES)}: {kept(certificate)}; without {helps[0]} {rate(first)}{but}"
     most = max(removals, key=lambda claim: claim.high)
     one = f"{'other ' if pinned else ''}{each}"
     without = f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without
     bound = _at_most(certificate)
-    often = rate(most) if bound is None else f"{_seldom(removals)} (upper bound: {percent_at_most(bound)} as often)"
+    often = (
+        rate(most)
+        if bound is None
+        else f"{_seldom(removals)} (upper bound: {percent_at_most(bound)} as often)"
+    )
     return f"no {one} can be removed: {kept(certificate)}; without {without}, {often}{but}"
 
 
@@ -116,9 +126,7 @@ def seeds_of(certificate: Certificate) -> str:
 
 def kept(certificate: Certificate) -> str:
     """What is left keeps: "f in 16 of 16 fresh runs (80 % to 100 %), at least 68 % of the whole world's rate"."""
-    return (
-        f"{rate(certificate.claims[0])}, at least {percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}"
-    )
+    return f"{rate(certificate.claims[0])}, at least {percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}"
 
 
 def _kept(certificate: Certificate) -> float:
@@ -130,7 +138,11 @@ def _kept(certificate: Certificate) -> float:
 def _at_most(certificate: Certificate) -> float | None:
     """How often f shows with any one model removed, at most, as a share of its rate with it; None if that was not bounded."""
     bounds = [claim.bound for claim in certificate.claims if claim.without is not None]
-    return max((bound for bound in bounds if bound is not None), default=None) if None not in bounds else None
+    return (
+        max((bound for bound in bounds if bound is not None), default=None)
+        if None not in bounds
+        else None
+    )
 
 
 def _as_often(bound: float | None) -> str:
@@ -143,10 +155,18 @@ def shown(state: RunState) -> str:
         return verdict_on(found, never_left_out(state, found))
     said = [missing(state)]
     if (now := state.certificate) is not None:
-        bounds = {name: claim.bound for name, claim in so_far(state, now).items() if claim.bound is not None}
+        bounds = {
+            name: claim.bound
+            for name, claim in so_far(state, now).items()
+            if claim.bound is not None
+        }
         if share := bounds.pop(None, 0.0):
             said.append(f"so far at least {percent_at_least(share)} of {_whole_rate(now)} is kept")
-        less = [f"without {name} f shows {_as_often(share)}" for name, share in bounds.items() if share < 1.0]
+        less = [
+            f"without {name} f shows {_as_often(share)}"
+            for name, share in bounds.items()
+            if share < 1.0
+        ]
         said += less[:MOST_NAMES]
     return "; ".join(said)
 
@@ -158,7 +178,11 @@ def uncertified(state: RunState, run: object) -> str:
 
 
 def _stayed(pinned: int) -> str:
-    return "1 pinned model was never left out" if pinned == 1 else f"{pinned} pinned models were never left out"
+    return (
+        "1 pinned model was never left out"
+        if pinned == 1
+        else f"{pinned} pinned models were never left out"
+    )
 
 
 def environment_named(node: int) -> str:
@@ -226,7 +250,9 @@ def without_in_another_simulator(name: str, verdict: str, there: Claim) -> str:
 
 
 def _there(there: Claim) -> str:
-    return f"f in {of_runs(there.shown, there.runs)} ({percent(there.low)} to {percent(there.high)})"
+    return (
+        f"f in {of_runs(there.shown, there.runs)} ({percent(there.low)} to {percent(there.high)})"
+    )
 
 
 def still_fails(fails: bool | None, certificate: Certificate) -> str:
@@ -278,7 +304,9 @@ def _whole_rate(certificate: Certificate) -> str:
 def of_passing(state: RunState, one: Isolation) -> str:
     """What an isolation that has ended shows, in one sentence without a full stop."""
     if not one.checks:
-        stacks = (stack_with(state, state.elements, state.elements[model]) for model in one.asked.suspects)
+        stacks = (
+            stack_with(state, state.elements, state.elements[model]) for model in one.asked.suspects
+        )
         return (
             "no passing world was found: the robot does not reach its goal often enough even without all "
             f"{count(len(set().union(*stacks)), 'model')} that may be removed"
@@ -294,7 +322,10 @@ def of_passing(state: RunState, one: Isolation) -> str:
     said = f"a nearest world that passes lacks {names}: without {without} {_reaching(one, first)}{tested}"
     verdicts = {str(claim.back): claim.verdict for claim in backs}
     if doubt := _doubt(
-        verdicts, "not shown that each of them has to go", "not a nearest one: the robot seems to pass", "with"
+        verdicts,
+        "not shown that each of them has to go",
+        "not a nearest one: the robot seems to pass",
+        "with",
     ):
         return f"{said}; {doubt} put back"
     most = max(backs, key=lambda claim: claim.high)
@@ -305,7 +336,9 @@ def of_passing(state: RunState, one: Isolation) -> str:
 
 
 def _reaching(one: Isolation, claim: Returned) -> str:
-    chosen = f"each of {count(len(one.asked.chosen), 'chosen run')} and in " if one.asked.chosen else ""
+    chosen = (
+        f"each of {count(len(one.asked.chosen), 'chosen run')} and in " if one.asked.chosen else ""
+    )
     return f"the robot reaches its goal in {chosen}{_share(claim.reached, claim)}"
 
 
@@ -319,9 +352,7 @@ def of_all_parts(left: Sequence[str], could_go: Sequence[str], smaller: Sequence
         return f"more can go: f also shows without {any_one}{first_of(could_go, MOST_NAMES)}"
     if not left:
         return "nothing is left that can be removed"
-    known = (
-        f"no single one can go: f is gone without {'it' if len(left) == 1 else f'any one of these {len(left)} models'}"
-    )
+    known = f"no single one can go: f is gone without {'it' if len(left) == 1 else f'any one of these {len(left)} models'}"
     if smaller:
         return f"{known}; but not the smallest: {', '.join(smaller)} show f, too"
     return f"{known}. No smaller set shows f either; only checking all sets can tell"
@@ -390,7 +421,10 @@ def smaller_known(state: RunState) -> str:
     """That a smaller environment is known to show f, which the search may not take, and where it is; "" if there is none."""
     left = len(state.environment)
     nodes = [
-        (len(node.environment), f"#{node.number} in the history{', taken back' if node.rejected else ''}")
+        (
+            len(node.environment),
+            f"#{node.number} in the history{', taken back' if node.rejected else ''}",
+        )
         for node in state.nodes
         if node.shown
         and not node.lost_rate
@@ -415,7 +449,11 @@ def missing(state: RunState) -> str:
     """Why the current environment has no finished certificate; "" if it has one."""
     if current(state) is not None:
         return ""
-    return "no fresh runs were made" if state.certificate is None else "its certificate is not finished"
+    return (
+        "no fresh runs were made"
+        if state.certificate is None
+        else "its certificate is not finished"
+    )
 
 
 def drift(state: RunState) -> Sentences:
@@ -429,7 +467,11 @@ def drift(state: RunState) -> Sentences:
     whole = origin(state, here.number)
     if whole is here:
         return ()
-    long, brief = ("in the whole world", "whole world") if whole.parent is None else ("where the branch began", "first")
+    long, brief = (
+        ("in the whole world", "whole world")
+        if whole.parent is None
+        else ("where the branch began", "first")
+    )
     return (
         f"f in {seen(here)} here, {seen(whole)} {long}",
         f"f {here.shown}/{len(here.runs)} here, {whole.shown}/{len(whole.runs)} {brief}",

@@ -29,7 +29,9 @@ def why_off(state: RunState) -> str:
     if ended is None:
         return ""
     if ended.certificate is not None:
-        return f"certificate {ended.certificate} refutes what tests that ended early accepted: {_OFF}"
+        return (
+            f"certificate {ended.certificate} refutes what tests that ended early accepted: {_OFF}"
+        )
     return f"test {ended.test} ended early, and test {ended.by}, the same to its end, has another verdict: {_OFF}"
 
 
@@ -37,7 +39,9 @@ def beside_record(test: Test, now: Mapping[str, Any], repeats: bool) -> str:
     """How a test that was made again, in full, compares with its record; one sentence without a full stop. `repeats`: its
     trajectory begins with the recorded one, to the last bit.
     """
-    then = ", ".join(filter(None, (_ending(test.outcome, test.failure, test.distance), ended_early(test))))
+    then = ", ".join(
+        filter(None, (_ending(test.outcome, test.failure, test.distance), ended_early(test)))
+    )
     ends = _ending(now["outcome"], now["failure"], now["distance"])
     if not repeats:
         differs = f"the trajectory differs; now: {ends}"

@@ -22,7 +22,16 @@ from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.runfile.tested import adoptable
-from ddenv.text import Sentences, as_sentence, count, first_of, percent, percent_at_least, plain, shortened
+from ddenv.text import (
+    Sentences,
+    as_sentence,
+    count,
+    first_of,
+    percent,
+    percent_at_least,
+    plain,
+    shortened,
+)
 from ddenv.words.baseline import baseline
 from ddenv.words.claims import (
     drift,
@@ -79,7 +88,13 @@ def explain(snapshot: Snapshot) -> Explanation:
     if snapshot.past:
         sentences = (snapshot.happened, *sentences)
     elif not snapshot.error:
-        sentences = (*_warnings(snapshot), *sentences, *_implied(state), *_offered(state), *_by_hand(state))
+        sentences = (
+            *_warnings(snapshot),
+            *sentences,
+            *_implied(state),
+            *_offered(state),
+            *_by_hand(state),
+        )
     line = None if step is None else shown.line(step, state.round)
     return Explanation(line, sentences, shown.lines)
 
@@ -109,7 +124,9 @@ def _implied(state: RunState) -> Sentences:
     last = next((test for test in reversed(state.tests) if test.is_finished), None)
     if last is None or last.implied_by is None or state.ended:
         return ()
-    return (f"Test {last.id} is implied by test {last.implied_by}: no model it lacks affected that run.",)
+    return (
+        f"Test {last.id} is implied by test {last.implied_by}: no model it lacks affected that run.",
+    )
 
 
 def _offered(state: RunState) -> Sentences:
@@ -142,7 +159,12 @@ def _by_hand(state: RunState) -> Sentences:
 def _arrival(state: RunState) -> str:
     """How the user's last decision led to this environment; "" if there is none, or a test was made since."""
     last = state.decisions[-1] if state.decisions else None
-    if state.here is None or last is None or last.tests != state.tests_done or last.kind not in _CHANGES:
+    if (
+        state.here is None
+        or last is None
+        or last.tests != state.tests_done
+        or last.kind not in _CHANGES
+    ):
         return ""
     return as_sentence(plain(last.words))
 
@@ -186,9 +208,7 @@ def _with_pause(state: RunState, happening: Happening) -> Happening:
         free = f"{state.needs_room / 1e6:.0f} MB"
         full = f"The disk is full: no new test starts until {free} are free."
         if state.file_is_full:
-            full = (
-                "The run file is as large as a file may be (ulimit -f): no new test starts until that limit is raised."
-            )
+            full = "The run file is as large as a file may be (ulimit -f): no new test starts until that limit is raised."
         return step, (f"{full} Nothing is lost.", *sentences)
     if not state.paused:
         return happening
@@ -201,19 +221,36 @@ def _standing(state: RunState, status: str) -> Sentences:
     reason = plain(state.reason).rstrip(".")
     match status:
         case "starting":
-            return ("The engine starts. It is a separate process: it goes on when this screen closes.",)
+            return (
+                "The engine starts. It is a separate process: it goes on when this screen closes.",
+            )
         case "created":
             return ("No engine has worked on this run yet. r starts one.",)
         case "failed":
-            return (f"The engine could not go on: {reason}.", "Everything so far is kept; r tries again.")
+            return (
+                f"The engine could not go on: {reason}.",
+                "Everything so far is kept; r tries again.",
+            )
         case "stopped":
-            said = reason if reason.startswith("stopped") else f"stopped: {reason}" if reason else "stopped"
+            said = (
+                reason
+                if reason.startswith("stopped")
+                else f"stopped: {reason}"
+                if reason
+                else "stopped"
+            )
             then = _out_of_budget(state) or ("Everything so far is kept; r resumes.",)
             return (f"The engine was {said}.", *then)
         case "lost":
             unfinished = state.tally["running"]
-            lost = f" Only {count(unfinished, 'unfinished test')} must run again." if unfinished else ""
-            return (f"The engine is not running: it was killed, or its machine went down. r resumes.{lost}",)
+            lost = (
+                f" Only {count(unfinished, 'unfinished test')} must run again."
+                if unfinished
+                else ""
+            )
+            return (
+                f"The engine is not running: it was killed, or its machine went down. r resumes.{lost}",
+            )
     return ()
 
 
@@ -238,8 +275,12 @@ def _baseline_so_far(state: RunState, options: Settings) -> Sentences:
     # The last one first: that the world is slow.
     said = [*(as_sentence(plain(words)) for _, words in reversed(state.notes)), first]
     if tests:
-        reached, failed = (sum(test.outcome == outcome for test in tests) for outcome in ("pass", "failed"))
-        said.append(f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.")
+        reached, failed = (
+            sum(test.outcome == outcome for test in tests) for outcome in ("pass", "failed")
+        )
+        said.append(
+            f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal."
+        )
     return tuple(said)
 
 
@@ -286,8 +327,15 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
     if candidate is None:
         first = f"No candidate of round {current.number} showed f."
         return "nothing", (first, fruitless(options, current, len(state.environment)))
-    running = [test for test in snapshot.running if test.round == current.number and test.candidate == candidate.index]
-    ahead = len({test.candidate for test in snapshot.running if test.round == current.number} - {candidate.index})
+    running = [
+        test
+        for test in snapshot.running
+        if test.round == current.number and test.candidate == candidate.index
+    ]
+    ahead = len(
+        {test.candidate for test in snapshot.running if test.round == current.number}
+        - {candidate.index}
+    )
     place = f"candidate {candidate.index + 1} of {len(current.candidates)}"
     place = f"{candidate.label} ({count(candidate.size, 'model')}), {place}"
     if not running:
@@ -307,7 +355,12 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
 def _last_reduction(state: RunState) -> Sentences:
     """The last reduction, until the next test is made: a step shows its result."""
     here = state.here
-    if here is None or here.how != "reduced" or here.parent is None or here.tests != state.tests_done:
+    if (
+        here is None
+        or here.how != "reduced"
+        or here.parent is None
+        or here.tests != state.tests_done
+    ):
         return ()
     before = len(state.nodes[here.parent].environment)
     return (f"{here.what} showed f: {before} → {count(len(here.environment), 'model')}.",)
@@ -315,7 +368,9 @@ def _last_reduction(state: RunState) -> Sentences:
 
 def _next(state: RunState, candidate: Candidate, place: str, options: Settings) -> str:
     if shown := _shown_of(state, candidate):
-        if options.accept_rate != "kept" and _last(state, candidate) == _last(state, candidate, "similar"):
+        if options.accept_rate != "kept" and _last(state, candidate) == _last(
+            state, candidate, "similar"
+        ):
             return f"{place}: {shown}, and once is enough."
         return f"Next is one more run of {place}: {shown}."
     if not candidate.tests:
@@ -326,7 +381,9 @@ def _next(state: RunState, candidate: Candidate, place: str, options: Settings) 
     return f"Next is re-run {len(candidate.tests)} of {options.most_runs - 1} of {place}: {again}"
 
 
-def _of_run(state: RunState, candidate: Candidate, number: int, place: str, options: Settings) -> Sentences:
+def _of_run(
+    state: RunState, candidate: Candidate, number: int, place: str, options: Settings
+) -> Sentences:
     """What a run of a candidate is for, its `number` counted from 0."""
     if not number:
         return (
@@ -356,7 +413,11 @@ def _why_again(before: Test | None) -> str:
     if before is None:
         return "another seed is tried at the same time."
     away = metres(before.distance)
-    how = f"{'' if before.failure in DEEDS else ' elsewhere,'} {away} from f's end" if away else ", but not as in f"
+    how = (
+        f"{'' if before.failure in DEEDS else ' elsewhere,'} {away} from f's end"
+        if away
+        else ", but not as in f"
+    )
     reasons = {
         "pass": "the goal was reached.",
         "other": f"the robot {deed(before.failure)}{how}.",
@@ -374,8 +435,17 @@ def _finished(state: RunState) -> Happening:
     if not state.certified:
         left = f"{kept} left: {first_of([plain(name) for name in state.environment], NAMED)}."
         helps = () if (found := current(state)) is None else only_helping(found)
-        out = (f"{plain(helps[0])} only helps: press H to leave it out and search again.",) if helps else ()
-        return "returned", (_reason(state, "The run ended early."), *out, *_out_of_budget(state), left)
+        out = (
+            (f"{plain(helps[0])} only helps: press H to leave it out and search again.",)
+            if helps
+            else ()
+        )
+        return "returned", (
+            _reason(state, "The run ended early."),
+            *out,
+            *_out_of_budget(state),
+            left,
+        )
     if not state.environment:
         none = "f shows without any removable model: look at the robot, its goal and the models that always stay."
         return "returned", ("Minimal: no model left.", _reason(state, ""), none, base)
@@ -383,7 +453,9 @@ def _finished(state: RunState) -> Happening:
     certificate = current(state)
     means = () if certificate is None else (as_sentence(promise(state, certificate)),)
     passing = (
-        () if state.isolated is None else (f"{as_sentence(plain(of_passing(state, state.isolated)))} W shows it.",)
+        ()
+        if state.isolated is None
+        else (f"{as_sentence(plain(of_passing(state, state.isolated)))} W shows it.",)
     )
     return "returned", (
         *passing,
@@ -400,14 +472,25 @@ def _instead_of_f(state: RunState) -> Sentences:
     """What the robot does without models that f needs, where it mostly fails in another way; and what can be done about it."""
     if (certificate := current(state)) is None:
         return ()
-    ends = {claim: end for claim in certificate.claims if (end := failing_instead(state, certificate, claim))}
-    said = [f"Without {plain(str(claim.without))} {instead(state, certificate, claim)}." for claim in ends][:NAMED_ENDS]
+    ends = {
+        claim: end
+        for claim in certificate.claims
+        if (end := failing_instead(state, certificate, claim))
+    }
+    said = [
+        f"Without {plain(str(claim.without))} {instead(state, certificate, claim)}."
+        for claim in ends
+    ][:NAMED_ENDS]
     epsilon = settings(state).epsilon
     # Where no distance is known, it is not near.
-    farthest = min((end.farthest for end in ends.values() if end.farthest <= NEAR * epsilon), default=None)
+    farthest = min(
+        (end.farthest for end in ends.values() if end.farthest <= NEAR * epsilon), default=None
+    )
     if farthest is not None:
         wider = math.floor(farthest * 10 + 1) / 10
-        said.append(f"To count that as f, too, start again with epsilon {wider:g} m (now {epsilon:g} m).")
+        said.append(
+            f"To count that as f, too, start again with epsilon {wider:g} m (now {epsilon:g} m)."
+        )
     if ends:
         passing = "" if state.isolated is not None else ", i finds a nearest world that passes"
         said.append(f"f lists all other failures and reduces one in a branch{passing}.")
@@ -420,7 +503,14 @@ def _reason(state: RunState, otherwise: str) -> str:
 
 def _last(state: RunState, candidate: Candidate, outcome: str | None = None) -> Test | None:
     tests = reversed(state.tests_of(candidate.tests))
-    return next((test for test in tests if test.outcome == outcome or (outcome is None and test.is_finished)), None)
+    return next(
+        (
+            test
+            for test in tests
+            if test.outcome == outcome or (outcome is None and test.is_finished)
+        ),
+        None,
+    )
 
 
 # While fresh runs show what the result of the rounds is worth, or find the nearest world that passes.
@@ -474,11 +564,17 @@ def _so_far(rows: Sequence[FreshRuns]) -> Sentences:
 
 def _now(snapshot: Snapshot, certificate: Certificate) -> Sentences:
     # A test of the certificate before may still run.
-    running = [test for test in snapshot.running if test.phase == "certify" and test.run >= certificate.first_run]
+    running = [
+        test
+        for test in snapshot.running
+        if test.phase == "certify" and test.run >= certificate.first_run
+    ]
     if not running:
         return ()
     test = running[0]
-    what = "everything that is left" if test.node == certificate.node else environment_named(test.node)
+    what = (
+        "everything that is left" if test.node == certificate.node else environment_named(test.node)
+    )
     if test.without is not None:
         what = f"everything that is left except {plain(test.without)}"
     return (f"Now: run {test.run - certificate.first_run + 1} of {what}.",)

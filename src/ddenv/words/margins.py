@@ -50,7 +50,9 @@ def rows(margins: Margins) -> tuple[Row, ...]:
         name = one.asked.name
         now = f"{one.asked.now:.4g} {one.asked.unit}".rstrip()
         sides = [side for side in one.sides if side.tried]
-        until = " … ".join("now" if side.until is None else f"{side.until.value:.4g}{_end(side)}" for side in sides)
+        until = " … ".join(
+            "now" if side.until is None else f"{side.until.value:.4g}{_end(side)}" for side in sides
+        )
         instead = ", ".join(words for side in sides if (words := _from(side)))
         sentence = f"{name} ({now}): {'; '.join(_said(side) for side in sides)}"
         found.append(Row((name, now, until, instead or "-", str(one.runs)), sentence, one))
@@ -58,7 +60,11 @@ def rows(margins: Margins) -> tuple[Row, ...]:
 
 
 def _end(side: Side) -> str:
-    return " (end)" if side.gone is None and side.until is not None and side.until.value == side.end else ""
+    return (
+        " (end)"
+        if side.gone is None and side.until is not None and side.until.value == side.end
+        else ""
+    )
 
 
 def _from(side: Side) -> str:
@@ -68,7 +74,11 @@ def _from(side: Side) -> str:
         return f"goal {to_end if side.to_end else 'at'} {side.goal.value:.4g}"
     if side.gone is None or side.gone.verdict != "other":
         return ""
-    failed = [how for how, outcome in zip(side.gone.failures, side.gone.outcomes, strict=True) if outcome == "other"]
+    failed = [
+        how
+        for how, outcome in zip(side.gone.failures, side.gone.outcomes, strict=True)
+        if outcome == "other"
+    ]
     return f"{max(failed, key=failed.count, default='f at times')} at {side.gone.value:.4g}"
 
 
@@ -76,17 +86,25 @@ def _said(side: Side) -> str:
     words = []
     if side.until is not None:
         all_of_them = ", the end of its range" if _end(side) else ""
-        words.append(f"f {'up' if side.up else 'down'} to {_in(side.until, 'similar')}{all_of_them}")
+        words.append(
+            f"f {'up' if side.up else 'down'} to {_in(side.until, 'similar')}{all_of_them}"
+        )
     if side.gone is not None and side.gone.verdict == "impossible":
         words.append(f"{side.gone.value:.4g} is not possible: {side.gone.why}")
     elif side.gone is not None and side.gone.verdict == "other":
         words.append(f"no f at {_in(side.gone, 'similar')}, where the robot {_instead(side.gone)}")
     if side.goal is not None:
-        to_end = f", and beyond at all values tried, to the end of its range ({side.end:.4g})" if side.to_end else ""
+        to_end = (
+            f", and beyond at all values tried, to the end of its range ({side.end:.4g})"
+            if side.to_end
+            else ""
+        )
         words.append(f"the robot reaches its goal at {_in(side.goal, 'pass')}{to_end}")
     if side.again is not None:
         words.append(f"f again at {_in(side.again, 'similar')}")
-    if undecided := [f"{each.value:.4g}" for each in side.tried if each.verdict in ("undecided", "")]:
+    if undecided := [
+        f"{each.value:.4g}" for each in side.tried if each.verdict in ("undecided", "")
+    ]:
         words.append(f"undecided at {', '.join(undecided)}")
     return ", ".join(words)
 
@@ -99,7 +117,9 @@ def _instead(value: Value) -> str:
     """What happened in runs that did not show f: "was lost in 5, reached its goal in 1"."""
     ends = zip(value.outcomes, value.failures, strict=True)
     happened = Counter(
-        "reached its goal" if end == "pass" else deed(how) for end, how in ends if end in ("pass", "other")
+        "reached its goal" if end == "pass" else deed(how)
+        for end, how in ends
+        if end in ("pass", "other")
     )
     return ", ".join(f"{what} in {runs}" for what, runs in happened.most_common())
 
@@ -113,17 +133,29 @@ def nearest_fix(margins: Margins) -> str:
     asked = next(each.asked for each in margins.numbers if each.asked.name == one.name)
     low, high = anytime_interval(one.reached, one.runs)
     now = {name: now for name, now, _ in asked.together} or {asked.name: asked.now}
-    change = " and ".join(f"{name} from {now[name]:.4g} to {to:.4g}" for name, to in changes_at(asked, one.value))
-    change += (
-        f", {100.0 * one.share:.2g} % of its scale" if not asked.together else f", {one.value:.2g} % of their ranges"
+    change = " and ".join(
+        f"{name} from {now[name]:.4g} to {to:.4g}" for name, to in changes_at(asked, one.value)
     )
-    only, first = ("", "The nearest fix found") if one.confirmed else (" only", "No fix is certified")
-    fresh = f"in {one.reached} of {count(one.runs, 'fresh run')} ({percent(low)} to {percent(high)})"
+    change += (
+        f", {100.0 * one.share:.2g} % of its scale"
+        if not asked.together
+        else f", {one.value:.2g} % of their ranges"
+    )
+    only, first = (
+        ("", "The nearest fix found") if one.confirmed else (" only", "No fix is certified")
+    )
+    fresh = (
+        f"in {one.reached} of {count(one.runs, 'fresh run')} ({percent(low)} to {percent(high)})"
+    )
     return f"{first}: {change}; the robot reaches its goal{only} {fresh}."
 
 
 def sureness(margins: Margins) -> str:
-    less = "" if margins.asked.certified else " No certificate has shown yet how often f shows in what is left."
+    less = (
+        ""
+        if margins.asked.certified
+        else " No certificate has shown yet how often f shows in what is left."
+    )
     return (
         "Claims hold for the values tried, not for those in between; the chance that any claim of a call is wrong is at most "
         f"{percent(ERROR)}.{less}"
@@ -132,7 +164,11 @@ def sureness(margins: Margins) -> str:
 
 def said(margins: Margins) -> list[str]:
     """All sentences: the nearest fix, each number, and what that is worth."""
-    return [*filter(None, [nearest_fix(margins)]), *(f"{one.sentence}." for one in rows(margins)), sureness(margins)]
+    return [
+        *filter(None, [nearest_fix(margins)]),
+        *(f"{one.sentence}." for one in rows(margins)),
+        sureness(margins),
+    ]
 
 
 def lines(margins: Margins) -> Iterator[str]:
@@ -149,7 +185,11 @@ def bar(one: Margin, width: int) -> str:
     for place in range(width):
         at = 2.0 * place / (width - 1) - 1.0
         change = at * at * one.asked.scale
-        beyond = (each for each in one.sides[at > 0.0].tried if abs(each.value - one.asked.now) >= 0.999 * change)
+        beyond = (
+            each
+            for each in one.sides[at > 0.0].tried
+            if abs(each.value - one.asked.now) >= 0.999 * change
+        )
         cells.append(" " if (each := next(beyond, None)) is None else _SIGNS.get(each.verdict, "·"))
     cells[width // 2] = "|"
     return "".join(cells)
@@ -188,7 +228,9 @@ def ran(_: RunState, after: RunState) -> str:
     if not value.verdict:
         return ""
     instead = f"; {_instead(value)}" if _instead(value) else ""
-    shown = f"f in {value.outcomes.count('similar')} of {count(len(value.outcomes), 'run')}{instead}"
+    shown = (
+        f"f in {value.outcomes.count('similar')} of {count(len(value.outcomes), 'run')}{instead}"
+    )
     return f"  {last.name} = {last.value:.4g}: {shown} · {finding(after).partition(', ')[2]}"
 
 

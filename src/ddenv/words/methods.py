@@ -10,7 +10,9 @@ from ddenv.runfile.state import Round
 from ddenv.schemas import BOTH, Kind, explanation, names, uses
 from ddenv.text import count, plain
 
-Step = Literal["baseline", "split", "next", "test", "rerun", "waiting", "reduced", "nothing", "returned"]
+Step = Literal[
+    "baseline", "split", "next", "test", "rerun", "waiting", "reduced", "nothing", "returned"
+]
 Lines = tuple[tuple[int, str], ...]
 
 
@@ -32,7 +34,9 @@ class Listing:
 
     def but(self, lines: dict[int, str]) -> Listing:
         """The same with other `lines`, by their numbers."""
-        return replace(self, lines=tuple((number, lines.get(number, code)) for number, code in self.lines))
+        return replace(
+            self, lines=tuple((number, lines.get(number, code)) for number, code in self.lines)
+        )
 
 
 def _listing(*lines: tuple[int, str, str]) -> Listing:
@@ -44,7 +48,11 @@ def _listing(*lines: tuple[int, str, str]) -> Listing:
 
 def is_sweep(current: Round | None) -> bool:
     """Whether the round leaves out each model in turn."""
-    if current is None or not current.candidates or len(current.candidates) != len(current.environment):
+    if (
+        current is None
+        or not current.candidates
+        or len(current.candidates) != len(current.environment)
+    ):
         return False
     return current.candidates[0].kind == "complement"
 
@@ -178,7 +186,11 @@ def follows(options: Settings, last: Round) -> str:
     if last.winner is not None or any(one.verdict in ("", "similar") for one in last.candidates):
         return ""
     reason = "No candidate showed f in the last round"
-    return f"{reason}, so {SMALLER[options.algorithm]}." if options.algorithm in SMALLER else f"{reason}."
+    return (
+        f"{reason}, so {SMALLER[options.algorithm]}."
+        if options.algorithm in SMALLER
+        else f"{reason}."
+    )
 
 
 def fruitless(options: Settings, current: Round, models: int) -> str:

@@ -57,7 +57,11 @@ def _where(state: RunState) -> str:
         return isolating(state)
     if state.margining is not None and not state.ended:
         return margins.finding(state)
-    return "baseline" if state.round is None else f"round {state.round.number}, n {state.round.n_partitions}"
+    return (
+        "baseline"
+        if state.round is None
+        else f"round {state.round.number}, n {state.round.n_partitions}"
+    )
 
 
 def isolating(state: RunState) -> str:
@@ -68,8 +72,14 @@ def isolating(state: RunState) -> str:
     if last is None or now is None:
         return ISOLATING
     gone = state.removals[last - 1].models
-    tried = f"without {count(len(gone), 'model')}" if gone else "whether the whole world still fails"
-    made = sum(test.run >= now.asked.run and test.is_finished for test in state.tests if test.phase == ISOLATE)
+    tried = (
+        f"without {count(len(gone), 'model')}" if gone else "whether the whole world still fails"
+    )
+    made = sum(
+        test.run >= now.asked.run and test.is_finished
+        for test in state.tests
+        if test.phase == ISOLATE
+    )
     return f"{ISOLATING}: {tried}{f', {made} fresh runs' if made else ''}"
 
 
@@ -79,7 +89,11 @@ def news(kind: str, before: RunState, after: RunState, attached: bool = False) -
         line = NEWS[kind](before, after)
     else:
         # All other decisions of the user carry their own words.
-        line = after.decisions[-1].words if len(after.decisions) > len(before.decisions) else SAID.get(kind, "")
+        line = (
+            after.decisions[-1].words
+            if len(after.decisions) > len(before.decisions)
+            else SAID.get(kind, "")
+        )
     return line if attached or not line else f"{line}{HINTS.get(kind, '')}"
 
 
@@ -113,7 +127,11 @@ def _supports(_: RunState, after: RunState) -> str:
     if after.unsettled:
         return f"it is unknown which models support others: {after.unsettled}"
     resting = len({upper for upper, _ in after.supports})
-    return f"{count(resting, 'model')} of the world {'rests' if resting == 1 else 'rest'} on others" if resting else ""
+    return (
+        f"{count(resting, 'model')} of the world {'rests' if resting == 1 else 'rest'} on others"
+        if resting
+        else ""
+    )
 
 
 def _round_started(_: RunState, after: RunState) -> str:
@@ -139,11 +157,19 @@ def _judged(state: RunState, judged: Iterable[Candidate | Trial | Removal]) -> s
             what = f"the whole world without {count(len(one.models), 'model')} ({first_of(one.models, MOST_NAMES)})"
         else:
             what = f"{one.label} ({count(one.size, 'model')})"
-        endings = Counter(_ending(state, test) for test in state.tests_of(one.tests) if test.is_finished)
-        ways = f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})" if endings else ""
+        endings = Counter(
+            _ending(state, test) for test in state.tests_of(one.tests) if test.is_finished
+        )
+        ways = (
+            f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})"
+            if endings
+            else ""
+        )
         implied = f", {words}" if (words := implied_words(state, one.tests)) else ""
         early = f", {words}" if (words := early_among(state.tests_of(one.tests))) else ""
-        said.append(f"  {what}: {one.verdict} after {count(len(one.tests), 'test')}{ways}{early}{implied}")
+        said.append(
+            f"  {what}: {one.verdict} after {count(len(one.tests), 'test')}{ways}{early}{implied}"
+        )
     return "".join(said)
 
 
@@ -170,7 +196,9 @@ def _left(state: RunState) -> str:
 
 def _certificate_started(_: RunState, after: RunState) -> str:
     last = after.certificates[-1]
-    what = f"fresh runs of what is left ({_left(after)}), without each model, and of the whole world"
+    what = (
+        f"fresh runs of what is left ({_left(after)}), without each model, and of the whole world"
+    )
     if last.seeds:
         what = f"the chosen seeds check what is left ({_left(after)}); fresh runs measure how often others show f"
     return f"certificate {last.number}: {what}; about {usual_runs(after, last)}"
@@ -187,7 +215,9 @@ NEWS: dict[str, Callable[[RunState, RunState], str]] = {
     "cluster": lambda _, after: after.cluster,
     "comparing": _comparing,
     "compared": _compared,
-    "clock_jumped": lambda *_: "  the machine slept, or its clock was set: that time does not count",
+    "clock_jumped": lambda *_: (
+        "  the machine slept, or its clock was set: that time does not count"
+    ),
     "disk_space": _disk_space,
     "supports": _supports,
     "noted": lambda _, after: after.notes[-1][1],
@@ -195,10 +225,14 @@ NEWS: dict[str, Callable[[RunState, RunState], str]] = {
     "baseline_finished": lambda _, after: baseline(after),
     "round_started": _round_started,
     "candidate_judged": _candidate_judged,
-    "trial_judged": lambda before, after: _judged(after, (one for one in after.trials if one not in before.trials)),
+    "trial_judged": lambda before, after: _judged(
+        after, (one for one in after.trials if one not in before.trials)
+    ),
     "waiting": _waiting,
     "reduced": lambda _, after: f"  reduced to {_left(after)} after {after.tests_done} tests",
-    "sliced": lambda _, after: f"  reduced to {_left(after)}: {slice_words(after, after.nodes[after.node])}",
+    "sliced": lambda _, after: (
+        f"  reduced to {_left(after)}: {slice_words(after, after.nodes[after.node])}"
+    ),
     "slices_refuted": lambda _, after: refuted_words(after),
     "early_stop_ended": lambda _, after: f"  {why_off(after)}",
     "certificate_started": _certificate_started,
@@ -206,14 +240,18 @@ NEWS: dict[str, Callable[[RunState, RunState], str]] = {
         f"  certificate {after.certificates[-1].number}: "
         f"{verdict_on(after.certificates[-1], never_left_out(after, after.certificates[-1]))}"
     ),
-    "rate_lost": lambda _, after: f"  back to {_left(after)}, the last environment not shown to have lost the rate",
+    "rate_lost": lambda _, after: (
+        f"  back to {_left(after)}, the last environment not shown to have lost the rate"
+    ),
     "left_out": lambda _, after: (
         f"  reduced to {_left(after)} after {after.tests_done} tests: {after.nodes[after.node].what} f seems to show about as often"
     ),
     "isolation_started": lambda *_: (
         f"{ISOLATING}: removing as few models as possible from the whole world so that the robot reaches its goal"
     ),
-    "removal_judged": lambda before, after: _judged(after, after.removals.changed_since(before.removals)),
+    "removal_judged": lambda before, after: _judged(
+        after, after.removals.changed_since(before.removals)
+    ),
     "isolation_checked": lambda _, after: (
         "  fresh runs: the robot reaches its goal in {0.reached} of {0.runs}: {0.verdict}".format(
             after.isolations[-1].checks[-1].claims[0]
@@ -251,7 +289,9 @@ def what_happened(moment: Moment) -> str:
     if kind == "finished":
         # With what result is explained beside it.
         return "the run ended"
-    return plain(news(kind, moment.before, state, attached=True)).rstrip(".") or kind.replace("_", " ")
+    return plain(news(kind, moment.before, state, attached=True)).rstrip(".") or kind.replace(
+        "_", " "
+    )
 
 
 def _of_test(state: RunState, test: Test) -> str:

@@ -36,8 +36,13 @@ LOOPS = 8
 
 def classes_at(screen: type[Screen[Any]], size: Size) -> str:
     """The classes of its breakpoints. A screen that begins with them opens 0.1 s sooner: it computes styles once."""
-    sides = (screen.HORIZONTAL_BREAKPOINTS or (), size.width), (screen.VERTICAL_BREAKPOINTS or (), size.height)
-    return " ".join(max(each for each in steps if each[0] <= length)[1] for steps, length in sides if steps)
+    sides = (
+        (screen.HORIZONTAL_BREAKPOINTS or (), size.width),
+        (screen.VERTICAL_BREAKPOINTS or (), size.height),
+    )
+    return " ".join(
+        max(each for each in steps if each[0] <= length)[1] for steps, length in sides if steps
+    )
 
 
 def attention(title: str, words: str, environment: Mapping[str, str]) -> str:
@@ -86,13 +91,25 @@ class Workbench(App[int]):
             "app",
             ("leave", "ctrl+q", "leave", "quit", "quit; an engine keeps running"),
             ("suspend", "ctrl+z", "suspend_process", "suspend", "suspend; fg brings it back"),
-            ("commands", "ctrl+p", "command_palette", "commands", "find any command, theme or model by name"),
+            (
+                "commands",
+                "ctrl+p",
+                "command_palette",
+                "commands",
+                "find any command, theme or model by name",
+            ),
             priority=True,
         ),
         *keys(
             "app",
             ("theme", "ctrl+t", "change_theme", "theme", "choose the colours for this session"),
-            ("names", "n", "map('toggle_layer', 'names')", "names", "show or hide the models' names on the map"),
+            (
+                "names",
+                "n",
+                "map('toggle_layer', 'names')",
+                "names",
+                "show or hide the models' names on the map",
+            ),
             ("screenshot", "f12", "screenshot", "screenshot", "save a picture of the screen (SVG)"),
         ),
     ]
@@ -189,7 +206,9 @@ class Workbench(App[int]):
         self._show_held()
 
     def _show_held(self) -> None:
-        if self._held is not None and not any(isinstance(screen, ModalScreen) for screen in self.screen_stack[-1:]):
+        if self._held is not None and not any(
+            isinstance(screen, ModalScreen) for screen in self.screen_stack[-1:]
+        ):
             (message, options) = self._held
             self._held = None
             self.clear_notifications()
@@ -202,7 +221,9 @@ class Workbench(App[int]):
             return RunScreen(asked.run, asked.engine, asked.watch, classes_at(RunScreen, self.size))
         from ddenv.workbench.setup.setup_screen import SetupScreen
 
-        return SetupScreen(self._reading, asked.like, asked.file, classes_at(SetupScreen, self.size))
+        return SetupScreen(
+            self._reading, asked.like, asked.file, classes_at(SetupScreen, self.size)
+        )
 
     @on(ShowRun)
     @on(ShowSetup)
@@ -231,7 +252,9 @@ class Workbench(App[int]):
         """Into the folder for downloads; servers have none, and there it is the current one."""
         import platformdirs
 
-        super().action_screenshot(filename, path or (None if platformdirs.user_downloads_path().is_dir() else "."))
+        super().action_screenshot(
+            filename, path or (None if platformdirs.user_downloads_path().is_dir() else ".")
+        )
 
     def action_map(self, does: str, *words: Any) -> None:
         """Has the maps of the screen do something: `zoom`, `fit`, or `toggle_layer`."""
@@ -261,7 +284,14 @@ class Workbench(App[int]):
 
     def action_leave(self) -> None:
         """Quits at once. An engine keeps running, and the terminal shows how to attach again."""
-        detach = next((screen.action_detach for screen in self.screen_stack if hasattr(screen, "action_detach")), None)
+        detach = next(
+            (
+                screen.action_detach
+                for screen in self.screen_stack
+                if hasattr(screen, "action_detach")
+            ),
+            None,
+        )
         if detach is None:
             self.exit(0)
         else:

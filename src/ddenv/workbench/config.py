@@ -62,7 +62,9 @@ def checked(wanted: Mapping[str, str], where: str) -> dict[str, str]:
     known = actions()
     for id in keymap:
         if id not in known:
-            raise UserError(f"{where}: keys: there is no action '{id}'{nearest(id, known)}; 'ddenv config' lists them")
+            raise UserError(
+                f"{where}: keys: there is no action '{id}'{nearest(id, known)}; 'ddenv config' lists them"
+            )
     for owner in _owners():
         _check_clashes(owner, keymap, where)
     return keymap
@@ -72,7 +74,9 @@ def _check_clashes(owner: type[DOMNode], keymap: Mapping[str, str], where: str) 
     """Raises UserError if a key of the user's belongs to two actions of one screen."""
     holders: dict[str, str] = {}
     everywhere = _bindings(Workbench) if issubclass(owner, Screen) else ()
-    for id in dict.fromkeys(binding.id for binding in (*_bindings(owner), *everywhere) if binding.id):
+    for id in dict.fromkeys(
+        binding.id for binding in (*_bindings(owner), *everywhere) if binding.id
+    ):
         usual = actions()[id].keys
         for key in keymap[id].split(",") if id in keymap else usual:
             other = holders.setdefault(key, id)
@@ -87,7 +91,11 @@ def _check_clashes(owner: type[DOMNode], keymap: Mapping[str, str], where: str) 
 @cache
 def _owners() -> tuple[type[DOMNode], ...]:
     home = import_module("ddenv.workbench")
-    names = [module.name for module in walk_packages(home.__path__, f"{home.__name__}.") if not module.ispkg]
+    names = [
+        module.name
+        for module in walk_packages(home.__path__, f"{home.__name__}.")
+        if not module.ispkg
+    ]
     classes = (value for name in names for value in vars(import_module(name)).values())
     ours = (value for value in classes if isinstance(value, type) and value.__module__ in names)
     with_keys = (each for each in ours if issubclass(each, DOMNode) and "BINDINGS" in vars(each))
@@ -98,7 +106,11 @@ def _bindings(owner: type[DOMNode]) -> Iterator[Binding]:
     """The owner's own bindings, and those of its base classes in ddenv."""
     for each in owner.__mro__:
         if each.__module__.startswith("ddenv."):
-            yield from (binding for binding in vars(each).get("BINDINGS", ()) if isinstance(binding, Binding))
+            yield from (
+                binding
+                for binding in vars(each).get("BINDINGS", ())
+                if isinstance(binding, Binding)
+            )
 
 
 def config_path() -> Path:
@@ -131,7 +143,9 @@ def read_config() -> Config:
 
     data = read_yaml(path) or {}
     if not isinstance(data, dict):
-        raise UserError(f"{path}: expected lines such as 'theme: {DARK.name}'; 'ddenv config --example' prints some")
+        raise UserError(
+            f"{path}: expected lines such as 'theme: {DARK.name}'; 'ddenv config --example' prints some"
+        )
     try:
         found = File.model_validate(data)
     except ValidationError as error:
@@ -152,18 +166,27 @@ def lines() -> list[str]:
         f"notify  {'yes' if config.notify else 'no'}",
         "",
     ]
-    keys = {id: _written(config.keys.get(id, ",".join(action.keys))) for id, action in actions().items()}
+    keys = {
+        id: _written(config.keys.get(id, ",".join(action.keys))) for id, action in actions().items()
+    }
     width, room = (max(map(len, words)) for words in (keys, keys.values()))
     for id, action in actions().items():
-        found.append(f"{'*' if id in config.keys else ' '} {id:<{width}}  {keys[id]:<{room}}  {action.words}")
+        found.append(
+            f"{'*' if id in config.keys else ' '} {id:<{width}}  {keys[id]:<{room}}  {action.words}"
+        )
     return [*found, "", "* marks your own keys"] if config.keys else found
 
 
 def example_lines() -> list[str]:
     """An example file that changes nothing: every action is a comment."""
-    begin = INTRODUCTION.format(path=config_path(), themes=f"One of {', '.join(theme_names())}.", theme=DARK.name)
+    begin = INTRODUCTION.format(
+        path=config_path(), themes=f"One of {', '.join(theme_names())}.", theme=DARK.name
+    )
     keys = {id: _quoted(_written(",".join(action.keys))) for id, action in actions().items()}
-    return [*begin.splitlines(), *(f"  # {id}: {keys[id]}  # {action.words}" for id, action in actions().items())]
+    return [
+        *begin.splitlines(),
+        *(f"  # {id}: {keys[id]}  # {action.words}" for id, action in actions().items()),
+    ]
 
 
 def _written(keys: str) -> str:
@@ -171,4 +194,8 @@ def _written(keys: str) -> str:
 
 
 def _quoted(keys: str) -> str:
-    return keys if all(char.isalnum() or char in "+, " for char in keys) and keys[0].isalpha() else f'"{keys}"'
+    return (
+        keys
+        if all(char.isalnum() or char in "+, " for char in keys) and keys[0].isalpha()
+        else f'"{keys}"'
+    )

@@ -70,7 +70,9 @@ class ExportScreen(ModalScreen[None]):
     CSS_PATH = "export.tcss"
     AUTO_FOCUS = "#export-world"
     BINDINGS: ClassVar = [
-        *keys("export", ("write", "ctrl+s", "write", "write", "write the chosen files"), priority=True),
+        *keys(
+            "export", ("write", "ctrl+s", "write", "write", "write the chosen files"), priority=True
+        ),
         *keys(
             "export",
             HELP,
@@ -93,13 +95,17 @@ class ExportScreen(ModalScreen[None]):
         folder = Path.home()
         with suppress(OSError):
             folder = Path.cwd()
-        with Framed("Export", "tab moves   space ticks   enter writes   ? help   escape closes", id="export"):
+        with Framed(
+            "Export", "tab moves   space ticks   enter writes   ? help   escape closes", id="export"
+        ):
             yield Static("", id="export-left", markup=False)
             with Horizontal(classes="row"):
                 yield Static("folder", classes="name", markup=False)
                 yield PathEntry(str(folder), id="export-folder")
             for id, title, end, _ in KINDS:
-                name = f"{stem}{end}{ending_of(self._world) if id == 'world' else ''}" if end else "."
+                name = (
+                    f"{stem}{end}{ending_of(self._world) if id == 'world' else ''}" if end else "."
+                )
                 with Horizontal(classes="row"):
                     title = title.replace("SDF", "YAML") if is_directives(self._world) else title
                     yield Tick(title, id in TICKED, id=f"export-{id}", compact=True, classes="name")
@@ -167,7 +173,9 @@ class ExportScreen(ModalScreen[None]):
                 continue
             name = self._value(f"{id}-name")
             if not name or not f"{folder}{name}".isprintable():
-                raise UserError(f"{title}: give a name{f' that ends in {endings[0]}' if endings[0] else ''}")
+                raise UserError(
+                    f"{title}: give a name{f' that ends in {endings[0]}' if endings[0] else ''}"
+                )
             wanted[id] = folder / without_tilde(name)
             if endings[0] and not wanted[id].name.lower().endswith(endings):
                 raise UserError(f"{title}: '{name}' does not end in {' or '.join(endings)}")
@@ -207,7 +215,11 @@ class ExportScreen(ModalScreen[None]):
 
     def _done(self, written: list[str], wrong: str) -> None:
         if not is_open(self):
-            self.app.notify(wrong or "\n".join(written), severity="error" if wrong else "information", markup=False)
+            self.app.notify(
+                wrong or "\n".join(written),
+                severity="error" if wrong else "information",
+                markup=False,
+            )
             return
         self._busy = False
         self._forget()
@@ -244,7 +256,11 @@ def write(run: Path, wanted: Wanted, stopped: Callable[[], bool]) -> Iterator[st
         if exported.needs:
             needs = [shortened(uri, LONGEST_NEED) for uri in exported.needs]
             yield f"the world still needs {first_of(needs, MOST_NEEDS)}"
-    for id, writer in (("report", partial(write_report, force=True)), ("bundle", write_bundle), ("test", write_test)):
+    for id, writer in (
+        ("report", partial(write_report, force=True)),
+        ("bundle", write_bundle),
+        ("test", write_test),
+    ):
         if id in wanted:
             yield from (f"wrote {plain(path)}" for path in writer(run, wanted[id]))
     if "mcap" in wanted:

@@ -73,7 +73,13 @@ class History(Screen[int | None]):
             with Framed("Reductions", id="tree-panel", classes="panel"):
                 yield Tree(id="tree", cursor_type="row", cell_padding=1)
             with Framed("What you decided", id="past-decisions", classes="panel"):
-                yield Lines(as_it_is, nothing=NOTHING_DECIDED, tail=True, parts=decision_lines, id="decisions")
+                yield Lines(
+                    as_it_is,
+                    nothing=NOTHING_DECIDED,
+                    tail=True,
+                    parts=decision_lines,
+                    id="decisions",
+                )
         yield Static("", id="about", markup=False)
         yield KeyFooter(ids("history", "help close go mark compare"))
 
@@ -102,13 +108,19 @@ class History(Screen[int | None]):
         for row in self._rows:
             node = row.node
             here = self._here
-            style = "bold" if node.number == here else "dim" if node.rejected or node.lost_rate else ""
+            style = (
+                "bold" if node.number == here else "dim" if node.rejected or node.lost_rate else ""
+            )
             size = f"{row.lines}{branches.sign(node, here)} {count(len(node.environment), 'model')}"
             marked = "marked" if node.number == self._marked else ""
             words = ", ".join(filter(None, (marked, branches.words(node, here))))
             cells = (size, str(node.number), plain(node.what), str(node.tests), seen(node), words)
             table.add_row(*(Text(text, style) for text in cells))
-        table.move_cursor(row=next((place for place, row in enumerate(self._rows) if row.node.number == cursor), 0))
+        table.move_cursor(
+            row=next(
+                (place for place, row in enumerate(self._rows) if row.node.number == cursor), 0
+            )
+        )
         self._show_about()
 
     @property
@@ -159,7 +171,9 @@ class History(Screen[int | None]):
             refuse(self, "this is the marked one: move to another one")
         else:
             first = self._tree[self._marked]
-            self.app.push_screen(SideBySide("Two environments side by side", lines(first, node, self._here)))
+            self.app.push_screen(
+                SideBySide("Two environments side by side", lines(first, node, self._here))
+            )
 
 
 def lines(first: Node, second: Node, here: int) -> Iterator[tuple[str, str, str]]:
@@ -171,9 +185,16 @@ def lines(first: Node, second: Node, here: int) -> Iterator[tuple[str, str, str]
     right = frozenset(second.environment)
     common = _named([name for name in first.environment if name in right])
     yield "in both", common, common
-    alone = [_named([name for name in node.environment if name not in left & right]) for node in (first, second)]
+    alone = [
+        _named([name for name in node.environment if name not in left & right])
+        for node in (first, second)
+    ]
     yield "only in this one", alone[0], alone[1]
 
 
 def _named(names: Sequence[str]) -> str:
-    return f"{len(names)}: {first_of([plain(shortened(name, 40)) for name in names], NAMED)}" if names else "none"
+    return (
+        f"{len(names)}: {first_of([plain(shortened(name, 40)) for name in names], NAMED)}"
+        if names
+        else "none"
+    )

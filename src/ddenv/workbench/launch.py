@@ -49,7 +49,12 @@ def check_terminal() -> None:
         # Something else than a terminal shows it, such as a browser.
         return
     output = sys.__stderr__
-    if output is not None and sys.__stdout__ is not None and sys.__stdout__.isatty() and not output.isatty():
+    if (
+        output is not None
+        and sys.__stdout__ is not None
+        and sys.__stdout__.isatty()
+        and not output.isatty()
+    ):
         # The screen is drawn on stderr, which may go to a file.
         os.dup2(sys.__stdout__.fileno(), output.fileno())
     if output is None or sys.__stdin__ is None or not (output.isatty() and sys.__stdin__.isatty()):
@@ -57,7 +62,9 @@ def check_terminal() -> None:
             "the workbench needs a terminal; 'ddenv run', 'ddenv resume' and 'ddenv report' work without one"
         )
     if os.environ.get("TERM") == "dumb":
-        raise UserError("TERM=dumb: this terminal cannot show a screen; 'ddenv run' and 'ddenv resume' need none")
+        raise UserError(
+            "TERM=dumb: this terminal cannot show a screen; 'ddenv run' and 'ddenv resume' need none"
+        )
     try:
         SIGNS.encode(output.encoding)
     except (UnicodeEncodeError, LookupError):

@@ -13,7 +13,17 @@ from typing import TextIO
 
 from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs
-from ddenv.guiding.commands import Command, Isolate, Row, Situation, StartEngine, question, said, send, starts_engine
+from ddenv.guiding.commands import (
+    Command,
+    Isolate,
+    Row,
+    Situation,
+    StartEngine,
+    question,
+    said,
+    send,
+    starts_engine,
+)
 from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
@@ -35,7 +45,11 @@ GUIDES = {
     "pause": ("pause", "space", "start no new test; again to resume"),
     "step": ("step", "s", "run one test, then pause"),
     "round": ("step_round", "S", "run to the end of the round, then pause"),
-    "accept": ("accept", "a", "accept the reduction that waits; 'accept try 1' adopts a try that shows f"),
+    "accept": (
+        "accept",
+        "a",
+        "accept the reduction that waits; 'accept try 1' adopts a try that shows f",
+    ),
     "reject": ("reject", "x", "reject the reduction that waits"),
     "veto": ("veto", "v", "leave out a candidate: 'veto part B'; again takes that back"),
     "pin": ("pin", "p", "keep models: 'pin crate_01, crate_02'; again unpins them"),
@@ -84,12 +98,16 @@ def _said_of(state: RunState, row: Candidate | Trial) -> str:
     verdict = row.verdict or ("in test" if running else "not judged yet")
     distance = row.distance if isinstance(row, Candidate) else None
     away = "" if distance is None else f", ranked by {distance:.1f}"
-    return f"{row.label}: {count(row.size, 'model')}, {verdict}, {count(len(row.tests), 'test')}{away}"
+    return (
+        f"{row.label}: {count(row.size, 'model')}, {verdict}, {count(len(row.tests), 'test')}{away}"
+    )
 
 
 def models(snapshot: Snapshot) -> Iterator[str]:
     state = snapshot.state
-    names = [f"{plain(name)}{' (pinned)' if name in state.pinned else ''}" for name in state.environment]
+    names = [
+        f"{plain(name)}{' (pinned)' if name in state.pinned else ''}" for name in state.environment
+    ]
     yield f"{count(len(names), 'model')} left: {first_of(names, NAMED) or 'none'}"
 
 
@@ -115,12 +133,16 @@ def meaning(line: str, now: Situation) -> Offer | None:
         if not names:
             raise UserError(f"{word}: which models? Type their names after it, separated by commas")
         if unknown := [name for name in names if name not in state.environment]:
-            raise UserError(f"there is no model '{unknown[0]}' in what is left; 'models' lists them")
+            raise UserError(
+                f"there is no model '{unknown[0]}' in what is left; 'models' lists them"
+            )
         return offer(action, now, Pointed(models=names))
     rows: list[Row] = [*state.trials, *(state.round.candidates if state.round is not None else ())]
     row = next((row for row in rows if row.label.casefold() == rest.casefold()), None)
     if rest and row is None:
-        raise UserError(f"there is no '{rest}' in this round; 'table' lists the candidates and tries")
+        raise UserError(
+            f"there is no '{rest}' in this round; 'table' lists the candidates and tries"
+        )
     return offer(action, now, Pointed(row))
 
 
@@ -131,7 +153,9 @@ class LineMode:
         self._out = out
         self._news: deque[str] = deque(maxlen=BEFORE)
         self._engine = Engine(path)
-        self._poll = Poll(path, starting=lambda: self._engine.starting, watch=watch, on_event=self._happened)
+        self._poll = Poll(
+            path, starting=lambda: self._engine.starting, watch=watch, on_event=self._happened
+        )
         self._error = ""
         # What a yes would send.
         self._asked: Command | None = None
@@ -142,7 +166,9 @@ class LineMode:
         `lines` gives what was typed, "" for nothing yet, None once nothing more can come.
         """
         self._look()
-        self._say(f"{plain(self._poll.path.stem)}: type help for what you can do; quit leaves, and the engine goes on")
+        self._say(
+            f"{plain(self._poll.path.stem)}: type help for what you can do; quit leaves, and the engine goes on"
+        )
         self._say(*self._news, *status(self._poll.snapshot))
         self._news = deque()
         for line in lines:
@@ -178,7 +204,13 @@ class LineMode:
     @property
     def _situation(self) -> Situation:
         snapshot = self._poll.snapshot
-        barred = WATCHING if self._poll.watch else "this run file cannot be read" if snapshot.error else ""
+        barred = (
+            WATCHING
+            if self._poll.watch
+            else "this run file cannot be read"
+            if snapshot.error
+            else ""
+        )
         return Situation(snapshot.state, snapshot.engine, barred)
 
     def _do(self, line: str) -> bool:

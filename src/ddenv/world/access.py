@@ -45,7 +45,9 @@ def ending_of(world: Path) -> str:
 def check_ending(file: Path, world: Path) -> None:
     """Whether `file` can hold a part of `world`: only its name says how it is read. Raises UserError."""
     if is_directives(file) != is_directives(world):
-        raise UserError(f"{file}: what is left of {world.name} needs a name that ends in {ending_of(world)}")
+        raise UserError(
+            f"{file}: what is left of {world.name} needs a name that ends in {ending_of(world)}"
+        )
 
 
 class Missing(Exception):
@@ -113,7 +115,11 @@ def not_yaml(where: object, error: Exception) -> UserError:
     """What a YAML parser says of the file `where`, with the line."""
     mark = getattr(error, "problem_mark", None)
     line = "" if mark is None else f":{mark.line + 1}"
-    problem = "nested too deeply" if isinstance(error, RecursionError) else getattr(error, "problem", None)
+    problem = (
+        "nested too deeply"
+        if isinstance(error, RecursionError)
+        else getattr(error, "problem", None)
+    )
     return UserError(f"{where}{line}: not valid YAML: {problem or 'not text'}")
 
 
@@ -143,7 +149,11 @@ def without_tilde(name: str) -> Path:
 
 def reason(error: OSError) -> str:
     """Why a file cannot be read."""
-    return "no such file" if isinstance(error, FileNotFoundError) else f"cannot be read: {error.strerror or error}"
+    return (
+        "no such file"
+        if isinstance(error, FileNotFoundError)
+        else f"cannot be read: {error.strerror or error}"
+    )
 
 
 def read_bytes(path: Path) -> bytes:
@@ -160,7 +170,9 @@ def resolved(path: Path) -> Path:
     try:
         str(whole).encode()
     except UnicodeEncodeError:
-        raise UserError(f"{whole}: this path is not UTF-8 text, so that no run can name it; rename it") from None
+        raise UserError(
+            f"{whole}: this path is not UTF-8 text, so that no run can name it; rename it"
+        ) from None
     return whole
 
 

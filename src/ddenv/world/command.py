@@ -42,9 +42,13 @@ def command_words(scenario: Scenario) -> tuple[str, ...]:
         name = scenario.oracle.program.partition(":")[0]
         top = name.partition(".")[0]
         # Nothing of it is imported.
-        if not top or not (any(folder.glob(f"{top}.*")) or (folder / top).is_dir() or find_spec(top) is not None):
+        if not top or not (
+            any(folder.glob(f"{top}.*")) or (folder / top).is_dir() or find_spec(top) is not None
+        ):
             hint = nearest(top, [file.stem for file in folder.glob("*.py")])
-            raise UserError(f"oracle.use: there is no module '{name}' in {folder}, nor installed{hint}")
+            raise UserError(
+                f"oracle.use: there is no module '{name}' in {folder}, nor installed{hint}"
+            )
         return ()
     try:
         words = shlex.split(scenario.oracle.command)
@@ -67,7 +71,11 @@ def _existing(scenario: Scenario) -> Path:
     """The oracle's folder. Raises UserError if there is none."""
     folder = start_folder(scenario)
     if not folder.is_dir():
-        key = "folder" if scenario.oracle is None or scenario.oracle.folder is None else "oracle.folder"
+        key = (
+            "folder"
+            if scenario.oracle is None or scenario.oracle.folder is None
+            else "oracle.folder"
+        )
         raise UserError(f"{key}: there is no folder {folder} to start the simulator in")
     return folder
 
@@ -90,7 +98,9 @@ def _program(word: str, folder: Path) -> str:
         head = file.read(LONGEST_FIRST_LINE)
     line = head.partition(b"\n")[0]
     interpreter = (
-        os.fsdecode(line[2:].replace(b"\t", b" ").strip(b" ").split(b" ")[0]) if line.startswith(b"#!") else ""
+        os.fsdecode(line[2:].replace(b"\t", b" ").strip(b" ").split(b" ")[0])
+        if line.startswith(b"#!")
+        else ""
     )
     # Binary programs contain NUL bytes.
     if b"\0" not in head and not os.access(interpreter, os.X_OK):

@@ -69,7 +69,9 @@ class Drive:
         `skid` is the ratio of the robot's turn rate to the one its wheels command.
         """
         if isinstance(command, WheelSpeeds):
-            return np.asarray(np.array([command.speeds.get(joint, 0.0) for joint in self.joints]) * self.signs)
+            return np.asarray(
+                np.array([command.speeds.get(joint, 0.0) for joint in self.joints]) * self.signs
+            )
         difference = command.turn_rate / skid * self.track / 2
         left = (command.speed - difference) / self.radius
         right = (command.speed + difference) / self.radius
@@ -83,7 +85,9 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
     Raises UserError for a robot that is static, or whose joints are no wheels on two sides.
     """
     if robot.static:
-        raise UserError(f"robot '{robot.name}': is static and cannot move; remove <static> from its file")
+        raise UserError(
+            f"robot '{robot.name}': is static and cannot move; remove <static> from its file"
+        )
     if wheels is None:
         sides = {joint.name: _side(robot, joint) > 0 for joint in robot.joints if _turns(joint)}
         if set(sides.values()) != {True, False}:
@@ -104,7 +108,9 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
     right = [_side(robot, joint) for joint in joints if not sides[joint.name]]
     track = sum(left) / len(left) - sum(right) / len(right)
     if track < NARROWEST:
-        raise UserError(f"robot.wheels: the left wheels of '{robot.name}' must lie to the left of the right ones")
+        raise UserError(
+            f"robot.wheels: the left wheels of '{robot.name}' must lie to the left of the right ones"
+        )
     return Drive(
         joints=tuple(joint.name for joint in joints),
         left=tuple(sides[joint.name] for joint in joints),
@@ -121,7 +127,11 @@ def _part_across(robot: Model, joint: Joint) -> float:
 
 def turning_links(robot: Model) -> tuple[Link, ...]:
     """The links of all joints that may be wheels: they turn about an axis across the robot."""
-    wheels = (joint for joint in robot.joints if _turns(joint) and abs(_part_across(robot, joint)) >= ACROSS)
+    wheels = (
+        joint
+        for joint in robot.joints
+        if _turns(joint) and abs(_part_across(robot, joint)) >= ACROSS
+    )
     return tuple(link for joint in wheels for link in wheel_links(robot, joint))
 
 
@@ -143,7 +153,10 @@ def rolled(robot: Model, drive: Drive, skid: float, rows: Floats) -> Floats:
         return np.zeros((len(rows), 2))
     to_model = robot.links[0].pose.inverse() @ robot.pose
     ahead = np.array(
-        [Pose((0.0, 0.0, 0.0), tuple(row[4:8])).rotate(to_model.rotate((1.0, 0.0, 0.0))) for row in rows.tolist()]
+        [
+            Pose((0.0, 0.0, 0.0), tuple(row[4:8])).rotate(to_model.rotate((1.0, 0.0, 0.0)))
+            for row in rows.tolist()
+        ]
     )
     between = (ahead[:-1] + ahead[1:]) / 2
     moved = (np.diff(rows[:, 1:4], axis=0) * between).sum(axis=1)
@@ -169,11 +182,17 @@ def _named(robot: Model, wheels: Wheels) -> dict[str, bool]:
     """The joints that `wheels` lists, and whether they are listed on the left."""
     turning = [joint.name for joint in robot.joints if _turns(joint)]
     others = {joint.name: joint.kind for joint in robot.joints if not _turns(joint)}
-    these = f"joints of '{robot.name}' that turn are {', '.join(turning)}" if turning else "none of its joints turns"
+    these = (
+        f"joints of '{robot.name}' that turn are {', '.join(turning)}"
+        if turning
+        else "none of its joints turns"
+    )
     for side, names in (("left", wheels.left), ("right", wheels.right)):
         for name in names:
             why = f"there is no joint '{name}'{nearest(name, turning)}"
-            why = f"'{name}' is a {others[name]} joint that does not turn" if name in others else why
+            why = (
+                f"'{name}' is a {others[name]} joint that does not turn" if name in others else why
+            )
             if name not in turning:
                 raise UserError(f"robot.wheels.{side}: {why}; {these}")
     name, times = Counter([*wheels.left, *wheels.right]).most_common(1)[0]
@@ -191,10 +210,14 @@ def _side(robot: Model, joint: Joint) -> float:
 
 def _radius(robot: Model, joint: Joint) -> float:
     """The radius of the wheel on `joint`, m."""
-    radii = [_round(one, joint.axis) for link in wheel_links(robot, joint) for one in link.collisions]
+    radii = [
+        _round(one, joint.axis) for link in wheel_links(robot, joint) for one in link.collisions
+    ]
     if not any(radii):
         what = "a cylinder, sphere, capsule, ellipsoid or mesh"
-        raise UserError(f"robot '{robot.name}': wheel '{joint.child}' has no round collision: {what}")
+        raise UserError(
+            f"robot '{robot.name}': wheel '{joint.child}' has no round collision: {what}"
+        )
     return max(radii)
 
 

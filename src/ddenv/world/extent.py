@@ -110,7 +110,9 @@ def filled_bounds(collision: Collision) -> Bounds:
 def stacked(boxes: Iterable[Bounds]) -> Bounds:
     """The lowest and the highest corners, (N, 3) m each, of N boxes."""
     pairs = list(boxes)
-    return np.array([low for low, _ in pairs]).reshape(-1, 3), np.array([high for _, high in pairs]).reshape(-1, 3)
+    return np.array([low for low, _ in pairs]).reshape(-1, 3), np.array(
+        [high for _, high in pairs]
+    ).reshape(-1, 3)
 
 
 def around(boxes: Iterable[Bounds]) -> Bounds | None:
@@ -124,7 +126,11 @@ def bounds(collisions: Iterable[Collision], frame: Pose = HERE) -> Bounds | None
 
     None if there are none.
     """
-    return around(shape_bounds(one.shape, frame @ one.pose) for one in collisions if not isinstance(one.shape, Plane))
+    return around(
+        shape_bounds(one.shape, frame @ one.pose)
+        for one in collisions
+        if not isinstance(one.shape, Plane)
+    )
 
 
 def center(model: Model) -> Vector:
@@ -175,7 +181,9 @@ def corners(world: World) -> tuple[Vector, Vector] | None:
     return None if box is None else (vector(box[0]), vector(box[1]))
 
 
-def with_ground_boxes(world: World, box: tuple[Vector, Vector] | None, places: Iterable[Vector] = ()) -> World:
+def with_ground_boxes(
+    world: World, box: tuple[Vector, Vector] | None, places: Iterable[Vector] = ()
+) -> World:
     """`world` with a box for each plane, wide enough for all between two corners and for `places` (m, world frame).
 
     Drake crashes with half spaces among hundreds of boxes, and on the bodies that its parser makes of static models (drake#19263).

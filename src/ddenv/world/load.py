@@ -49,7 +49,9 @@ def find_scenario(name: str) -> Path:
     if re.fullmatch(r"[\w-]+", name) and bundled.is_file():
         return bundled
     names = bundled_names()
-    raise UserError(f"no scenario '{name}'{nearest(name, names)}; bundled are {', '.join(names)}; or give a YAML file")
+    raise UserError(
+        f"no scenario '{name}'{nearest(name, names)}; bundled are {', '.join(names)}; or give a YAML file"
+    )
 
 
 def load_scenario(path: Path) -> Scenario:
@@ -61,7 +63,9 @@ def load_scenario(path: Path) -> Scenario:
     reading = scenario.reading.model_copy(update={"model_path": model_path})
     places: Data = {"world": folder / scenario.world, "folder": folder / scenario.folder}
     if scenario.oracle is not None and scenario.oracle.folder is not None:
-        places["oracle"] = scenario.oracle.model_copy(update={"folder": folder / scenario.oracle.folder})
+        places["oracle"] = scenario.oracle.model_copy(
+            update={"folder": folder / scenario.oracle.folder}
+        )
     return scenario.model_copy(update={**places, "robot": robot, "reading": reading})
 
 
@@ -105,10 +109,17 @@ def validate(data: Data, where: str, named: Mapping[str, str] = {}) -> Scenario:
     except ValidationError as error:
         raise _wrong(where, *complaint(error.errors()[0], Scenario), named) from None
     # Not the model's own matter: a run is shown also where the package that brought its schemas is missing.
-    known = {kind: list(schemas.names(kind)) for kind in ("algorithm", "partitioning", "prioritization")}
+    known = {
+        kind: list(schemas.names(kind)) for kind in ("algorithm", "partitioning", "prioritization")
+    }
     pairs = f"{', '.join(known['partitioning'])}, then '/', then one of {', '.join(known['prioritization'])}"
     for key, value, names, allowed in (
-        ("algorithm", scenario.reduction.algorithm, known["algorithm"], ", ".join(known["algorithm"])),
+        (
+            "algorithm",
+            scenario.reduction.algorithm,
+            known["algorithm"],
+            ", ".join(known["algorithm"]),
+        ),
         ("pair", scenario.reduction.pair, list(schemas.pairs()), pairs),
     ):
         if value not in names:
@@ -128,7 +139,11 @@ def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
     kind = error["type"]
     found = _shown(error["input"])
     if kind == "extra_forbidden":
-        shorthands = [one.name for one in SETTINGS.values() if not one.stored and [one.section] == location[:-1]]
+        shorthands = [
+            one.name
+            for one in SETTINGS.values()
+            if not one.stored and [one.section] == location[:-1]
+        ]
         known = sorted([*_section(model, location[:-1]).model_fields, *shorthands])
         return key, f"unknown key{nearest(location[-1], known)}; allowed are {', '.join(known)}"
     if kind == "as_printed":
@@ -137,7 +152,10 @@ def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
         return key, "is missing"
     if kind == "literal_error":
         allowed = error["ctx"]["expected"].replace("'", "").replace(" or ", ", ")
-        return key, f"{found} is not allowed{nearest(str(error['input']), allowed.split(', '))}; use one of {allowed}"
+        return (
+            key,
+            f"{found} is not allowed{nearest(str(error['input']), allowed.split(', '))}; use one of {allowed}",
+        )
     if kind == "string_pattern_mismatch" and key == "controller.use":
         return key, f"expected straight, costmap or module:Class, found {found}"
     plain = error["msg"][:1].lower() + error["msg"][1:].replace("Input should", "should")
@@ -149,7 +167,11 @@ def _section(model: type[BaseModel], location: list[str]) -> type[BaseModel]:
     for part in (each for each in location if each in model.model_fields):
         hint = model.model_fields[part].annotation
         # A section that may be missing is a union with None.
-        model = next(each for each in (hint, *get_args(hint)) if isinstance(each, type) and issubclass(each, BaseModel))
+        model = next(
+            each
+            for each in (hint, *get_args(hint))
+            if isinstance(each, type) and issubclass(each, BaseModel)
+        )
     return model
 
 

@@ -175,7 +175,9 @@ PLAY = 1e-4
 def is_fixed(joint: Joint) -> bool:
     """Whether `joint` allows no motion."""
     limited = joint.kind in ("revolute", "prismatic")
-    return joint.kind == "fixed" or (limited and joint.upper - joint.lower < PLAY and joint.lower <= 0 <= joint.upper)
+    return joint.kind == "fixed" or (
+        limited and joint.upper - joint.lower < PLAY and joint.lower <= 0 <= joint.upper
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -313,7 +315,9 @@ class World:
         while new:
             new = frozenset(other for model, other in self.ties if model in new) - stay
             stay |= new
-        return tuple(model.name for model in self.models if model.name not in stay and not is_ground(model))
+        return tuple(
+            model.name for model in self.models if model.name not in stay and not is_ground(model)
+        )
 
 
 # A box drawn as an infinite plane, and at least this long and wide, stands for one, m.
@@ -328,7 +332,9 @@ def is_ground(model: Model) -> bool:
     if any(isinstance(collision.shape, Ground) for collision in model.collisions):
         return True
     shown = any(isinstance(visual.shape, Plane) for visual in model.visuals)
-    boxes = (one.shape.size for one in model.collisions if isinstance(one.shape, Box)) if shown else ()
+    boxes = (
+        (one.shape.size for one in model.collisions if isinstance(one.shape, Box)) if shown else ()
+    )
     return any(min(size[:2]) >= ENDLESS for size in boxes)
 
 

@@ -59,7 +59,9 @@ class Clearance:
     def widest(self, places: Booleans, others: Booleans) -> float:
         """The width of the widest way from one of the `places` to one of the `others` (N, M), m; 0 if there is none."""
         widths = np.unique(2 * self.free)[1:]
-        number = bisect_left(widths, True, key=lambda width: not self.joined(width, places)[others].any())
+        number = bisect_left(
+            widths, True, key=lambda width: not self.joined(width, places)[others].any()
+        )
         # From middle to middle of two columns that block it is half a column farther, on average, than what is free.
         return float(widths[number - 1]) - self.cell / 2 if number else 0.0
 
@@ -69,13 +71,19 @@ class Clearance:
         return _distances(~open_ground) * self.cell <= DOOR / 2
 
 
-def clearance(world: World, width: float, height: float, level: float, points: list[Point]) -> Clearance:
+def clearance(
+    world: World, width: float, height: float, level: float, points: list[Point]
+) -> Clearance:
     """The clearance around all models and `points` for a robot of this size that stands on the height `level`, all in m."""
     from scipy.ndimage import minimum_filter
 
     step = height / 2
     shapes = [one for model in world.models if model.static for one in model.collisions]
-    boxes = [(one, *shape_bounds(one.shape, one.pose)) for one in shapes if not isinstance(one.shape, Ground)]
+    boxes = [
+        (one, *shape_bounds(one.shape, one.pose))
+        for one in shapes
+        if not isinstance(one.shape, Ground)
+    ]
     boxes = [box for box in boxes if box[1][2] < level + height and box[2][2] > level + step]
     ends = np.array([*points, *(corner[:2] for _, *corners in boxes for corner in corners)])
     low = ends.min(axis=0) - MARGIN

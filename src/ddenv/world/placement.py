@@ -12,7 +12,16 @@ import numpy as np
 from ddenv.errors import UserError
 from ddenv.text import count, first_of
 from ddenv.world.drive import turning_links
-from ddenv.world.extent import Bounds, around, bounds, filled_bounds, model_bounds, shape_bounds, stacked, vertices_of
+from ddenv.world.extent import (
+    Bounds,
+    around,
+    bounds,
+    filled_bounds,
+    model_bounds,
+    shape_bounds,
+    stacked,
+    vertices_of,
+)
 from ddenv.world.model import Collision, Ground, Mesh, Model, Plane, Terrain, World, is_ground
 from ddenv.world.passage import Clearance, clearance
 from ddenv.world.pose import Pose
@@ -47,7 +56,9 @@ def check_spawn(world: World, robot: Model, spawn: Spawn, goal: Goal | None = No
     if found := stands_inside(world, robot, spawn, goal):
         why, free = found
         hint = (
-            "move the spawn" if free is None else f"free nearby: --spawn={free.x:g},{free.y:g},{free.z:g},{free.yaw:g}"
+            "move the spawn"
+            if free is None
+            else f"free nearby: --spawn={free.x:g},{free.y:g},{free.z:g},{free.yaw:g}"
         )
         raise UserError(f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g}): {why}; {hint}")
 
@@ -66,7 +77,11 @@ def stands_inside(
     model, depth, collision = found
 
     def moved(x: float, y: float, z: float) -> Spawn:
-        places = {"x": round(spawn.x + x, 2), "y": round(spawn.y + y, 2), "z": round(spawn.z + z, 2)}
+        places = {
+            "x": round(spawn.x + x, 2),
+            "y": round(spawn.y + y, 2),
+            "z": round(spawn.z + z, 2),
+        }
         return spawn.model_copy(update=places)
 
     # At this height, or just above what the robot is inside of.
@@ -83,7 +98,9 @@ def stands_inside(
     return f"the robot stands inside {what} '{model.name}' by {depth:.2f} m", free
 
 
-def _by_room(places: Iterable[Spawn], world: World, robot: Model, spawn: Spawn, goal: Goal) -> list[Spawn]:
+def _by_room(
+    places: Iterable[Spawn], world: World, robot: Model, spawn: Spawn, goal: Goal
+) -> list[Spawn]:
     """Places near `spawn`, sorted: outdoors last if the goal is not, first those from which the robot gets to the goal."""
     room, width = _clearance(world, robot, spawn, goal)
     end = room.near((goal.x, goal.y), goal.tolerance)
@@ -108,7 +125,9 @@ def _clearance(world: World, robot: Model, spawn: Spawn, goal: Goal) -> tuple[Cl
     # Which side is its front is not known.
     width = float(size[:2].min())
     level = spawn.z + float(own[0][2]) - drop(world, robot, spawn)
-    return clearance(world, width, float(size[2]), level, [(spawn.x, spawn.y), (goal.x, goal.y)]), width
+    return clearance(
+        world, width, float(size[2]), level, [(spawn.x, spawn.y), (goal.x, goal.y)]
+    ), width
 
 
 def note_passage(world: World, robot: Model, spawn: Spawn, goal: Goal) -> Iterator[tuple[str, str]]:
@@ -119,7 +138,9 @@ def note_passage(world: World, robot: Model, spawn: Spawn, goal: Goal) -> Iterat
     if room.joined(width + room.cell / 2, start)[end].any():
         return
     widest = room.widest(start, end)
-    wide = f"no way from start to goal is wider than {widest:.2f} m: the robot is {width:.2f} m wide"
+    wide = (
+        f"no way from start to goal is wider than {widest:.2f} m: the robot is {width:.2f} m wide"
+    )
     yield "passage", wide if widest else "no way leads from start to goal"
 
 
@@ -187,13 +208,21 @@ class Inside:
     depth: float
 
 
-def notes_on_start(world: World, robot: Model, spawn: Spawn, goal: Goal | None = None) -> Iterator[tuple[str, str]]:
+def notes_on_start(
+    world: World, robot: Model, spawn: Spawn, goal: Goal | None = None
+) -> Iterator[tuple[str, str]]:
     """What is wrong with the start of the robot in `world`, and with its `goal`: a word and a sentence for each."""
     height = drop(world, robot, spawn)
     if height > DROP:
-        yield "drop", f"the robot starts {height:.2f} m above the surface below it and drops; lower the spawn's z"
+        yield (
+            "drop",
+            f"the robot starts {height:.2f} m above the surface below it and drops; lower the spawn's z",
+        )
     if world.gravity[2] >= 0.0:
-        yield "gravity", f"gravity is {world.gravity[2]:g} m/s^2 upwards: the robot does not stay on the ground"
+        yield (
+            "gravity",
+            f"gravity is {world.gravity[2]:g} m/s^2 upwards: the robot does not stay on the ground",
+        )
     hanging = drop(world, replace(robot, links=turning_links(robot)), spawn) - height
     if hanging > HANGING:
         yield (
@@ -210,7 +239,10 @@ def _note_goal(world: World, goal: Goal, height: float) -> Iterator[tuple[str, s
     """That the goal lies inside a model at this height, m."""
     # Meshes may be ground, too.
     solid = (
-        (model, one) for model in world.models for one in model.collisions if not isinstance(one.shape, Ground | Mesh)
+        (model, one)
+        for model in world.models
+        for one in model.collisions
+        if not isinstance(one.shape, Ground | Mesh)
     )
     place = Hull(np.array([[goal.x, goal.y, height]]))
     blocker = next((model.name for model, one in solid if _depth(place, one) > TOLERANCE), None)
@@ -218,7 +250,9 @@ def _note_goal(world: World, goal: Goal, height: float) -> Iterator[tuple[str, s
         yield "goal", f"at the height of the start, the goal lies inside {blocker}; move the goal"
 
 
-def note_floor(world: World, robot: Model, spawn: Spawn, removable: Collection[str]) -> Iterator[tuple[str, str]]:
+def note_floor(
+    world: World, robot: Model, spawn: Spawn, removable: Collection[str]
+) -> Iterator[tuple[str, str]]:
     """That everything stands on one of the `removable` models, so that a test without it only shows that the robot falls."""
     standing = bounds(robot.collisions, spawn_pose(spawn) @ robot.pose.inverse())
     if standing is None or any(is_ground(model) for model in world.models):
@@ -227,7 +261,11 @@ def note_floor(world: World, robot: Model, spawn: Spawn, removable: Collection[s
     for model in world.models:
         others = [box for name, box in boxes.items() if name != model.name and box is not None]
         above = stacked([*others, standing])
-        if model.static and model.name in removable and any(_carries(one, above) for one in model.collisions):
+        if (
+            model.static
+            and model.name in removable
+            and any(_carries(one, above) for one in model.collisions)
+        ):
             why = f"everything stands on '{model.name}': without it the robot falls"
             yield "floor", f"{why}; --protect '{model.name}' saves the tests without it"
 
@@ -313,9 +351,13 @@ def _near(shapes: Sequence[tuple[Model, Collision]], boxes: Bounds) -> Iterator[
     ends = np.searchsorted(low[order, 0], high[:, 0])
     for place, number in enumerate(order.tolist()):
         others = order[place + 1 : ends[number]]
-        deep = (np.minimum(high[number], high[others]) - np.maximum(low[number], low[others]) > INSIDE).all(axis=1)
+        deep = (
+            np.minimum(high[number], high[others]) - np.maximum(low[number], low[others]) > INSIDE
+        ).all(axis=1)
         able = (free[number] | free[others]) & (owners[number] != owners[others])
-        yield from ((min(number, other), max(number, other)) for other in others[deep & able].tolist())
+        yield from (
+            (min(number, other), max(number, other)) for other in others[deep & able].tolist()
+        )
 
 
 def overlap_of(model: Model, other: Model) -> float:
@@ -331,7 +373,11 @@ def drop(world: World, robot: Model, spawn: Spawn) -> float:
     """
     place = spawn_pose(spawn) @ robot.pose.inverse()
     bodies = [hull(one, place) for one in robot.collisions if not isinstance(one.shape, Ground)]
-    boxes = [shape_bounds(one.shape, place @ one.pose) for one in robot.collisions if not isinstance(one.shape, Ground)]
+    boxes = [
+        shape_bounds(one.shape, place @ one.pose)
+        for one in robot.collisions
+        if not isinstance(one.shape, Ground)
+    ]
     heights = []
     for collision in world.collisions:
         if isinstance(collision.shape, Terrain):
@@ -339,7 +385,11 @@ def drop(world: World, robot: Model, spawn: Spawn) -> float:
             continue
         low, high = shape_bounds(collision.shape, collision.pose)
         endless = isinstance(collision.shape, Plane)
-        below = (bottom for bottom, top in boxes if endless or ((bottom < high)[:2].all() and (low < top)[:2].all()))
+        below = (
+            bottom
+            for bottom, top in boxes
+            if endless or ((bottom < high)[:2].all() and (low < top)[:2].all())
+        )
         # What is above the robot does not stop its fall.
         heights += [float(bottom[2] - high[2]) for bottom in below if low[2] <= bottom[2]]
     return max(0.0, min(heights, default=0.0))
@@ -385,7 +435,9 @@ def distance(a: Hull, b: Hull) -> float:
 
     differences = _differences(a, b)
     # Of all weighted means of the differences the one nearest to zero: least squares with a row that asks for a sum of 1.
-    weights, _ = nnls(np.vstack([differences.T, np.ones(len(differences))]), np.array([0.0, 0.0, 0.0, 1.0]))
+    weights, _ = nnls(
+        np.vstack([differences.T, np.ones(len(differences))]), np.array([0.0, 0.0, 0.0, 1.0])
+    )
     return float(np.linalg.norm(weights @ differences)) / float(weights.sum())
 
 

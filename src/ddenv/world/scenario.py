@@ -96,7 +96,9 @@ class Lidar(Section):
 
     rate: Positive = Field(default=10.0, description="scan rate, Hz")
     beams: int = Field(default=541, ge=2, le=10_000)
-    angle: Positive = Field(default=math.radians(270), le=math.tau, description="field of view, rad")
+    angle: Positive = Field(
+        default=math.radians(270), le=math.tau, description="field of view, rad"
+    )
     range: Positive = Field(default=20.0, description="maximum range, m")
     nearest: NotNegative = Field(default=0.05, description="minimum range, m")
     noise: NotNegative = Field(default=0.01, description="standard deviation of a range, m")
@@ -116,14 +118,19 @@ class Sensors(Section):
     gyro: NotNegative = Field(default=0.01, description="IMU yaw rate, rad/s")
     gyro_bias: NotNegative = Field(default=0.0, description="constant error of the yaw rate, rad/s")
     tilt: NotNegative = Field(default=0.005, description="IMU roll and pitch, rad")
-    odometry: NotNegative = Field(default=0.02, description="wheel speeds, as a fraction of the speed")
+    odometry: NotNegative = Field(
+        default=0.02, description="wheel speeds, as a fraction of the speed"
+    )
     odometry_bias: NotNegative = Field(
         default=0.0, description="constant error of the wheel speeds, as a fraction of the speed"
     )
     view_range: NotNegative = Field(
-        default=0.0, description="how far the robot sees models, m; 0: it only feels what it touches"
+        default=0.0,
+        description="how far the robot sees models, m; 0: it only feels what it touches",
     )
-    view_angle: Positive = Field(default=math.tau, le=math.tau, description="field of view about its heading, rad")
+    view_angle: Positive = Field(
+        default=math.tau, le=math.tau, description="field of view about its heading, rad"
+    )
     compass_rate: Positive = Field(default=10.0, description="reading rate, Hz")
     imu_rate: Positive = Field(default=20.0, description="reading rate, Hz")
     odometry_rate: Positive = Field(default=20.0, description="reading rate, Hz")
@@ -136,12 +143,20 @@ class Planner(Section):
     size: float = Field(default=12.0, ge=4, le=100, description="length and width of the map, m")
     resolution: float = Field(default=0.1, ge=0.02, le=0.5, description="cell size of the map, m")
     padding: NotNegative = Field(default=0.05, description="clearance kept around the robot, m")
-    inflation: NotNegative = Field(default=0.6, description="distance within which obstacles add cost, m")
+    inflation: NotNegative = Field(
+        default=0.6, description="distance within which obstacles add cost, m"
+    )
     look_ahead: Positive = Field(default=0.8, description="look-ahead distance on the plan, m")
     replan: Positive = Field(default=2.0, description="maximum time between two plans, s")
-    patience: Positive = Field(default=4.0, description="time without progress before the robot tries to recover, s")
-    recoveries: int = Field(default=6, ge=0, description="attempts to recover in a row before the robot gives up")
-    lowest: Coordinate = Field(default=0.1, description="minimum height of an obstacle above where the robot stands, m")
+    patience: Positive = Field(
+        default=4.0, description="time without progress before the robot tries to recover, s"
+    )
+    recoveries: int = Field(
+        default=6, ge=0, description="attempts to recover in a row before the robot gives up"
+    )
+    lowest: Coordinate = Field(
+        default=0.1, description="minimum height of an obstacle above where the robot stands, m"
+    )
 
 
 class Controller(Section):
@@ -153,22 +168,34 @@ class Controller(Section):
 
     use: str = Field(default="straight", pattern=r"^(straight|costmap|[\w.]+:\w+)$")
     options: Data = {}
-    period: Positive = Field(default=0.05, description="time between two commands, s; a whole number of time steps")
+    period: Positive = Field(
+        default=0.05, description="time between two commands, s; a whole number of time steps"
+    )
     speed: Positive = Field(default=1.0, description="maximum forward speed, m/s")
     acceleration: Positive = Field(default=1.0, description="maximum forward acceleration, m/s^2")
     turn_rate: Positive = Field(default=1.0, description="maximum commanded turn rate, rad/s")
     heading_gain: Positive = Field(default=1.5, description="turn rate per heading error, 1/s")
     skid: Positive = Field(
-        default=0.43, le=1, description="share of a commanded turn that is carried out; 1 without skidding"
+        default=0.43,
+        le=1,
+        description="share of a commanded turn that is carried out; 1 without skidding",
     )
-    motor_gain: Positive = Field(default=30.0, description="wheel torque per wheel speed error, N m s/rad")
+    motor_gain: Positive = Field(
+        default=30.0, description="wheel torque per wheel speed error, N m s/rad"
+    )
     planner: Planner = Planner()
-    answer_within: Positive = Field(default=1.0, description="real time that your own controller has for a command, s")
+    answer_within: Positive = Field(
+        default=1.0, description="real time that your own controller has for a command, s"
+    )
 
 
 def _with_as_printed(schema: Data) -> None:
     one = settings.SETTINGS["as_printed"]
-    schema["properties"][one.name] = {"type": "boolean", "default": one.default, "description": one.summary}
+    schema["properties"][one.name] = {
+        "type": "boolean",
+        "default": one.default,
+        "description": one.summary,
+    }
 
 
 class _Printed(Section):
@@ -188,7 +215,9 @@ class _Printed(Section):
             return given
         for name, value in settings.PRINTED.items():
             if given.setdefault(name, value) != value:
-                raise _wrong(f"the paper has {name}: {value}, but {name} is {given[name]!r:.40}; leave one of them out")
+                raise _wrong(
+                    f"the paper has {name}: {value}, but {name} is {given[name]!r:.40}; leave one of them out"
+                )
         return given
 
     @property
@@ -206,9 +235,13 @@ def _section(name: str, section: str, base: type[Section] = Section) -> Any:
     declaration = settings.SECTIONS[section]
     hints = get_type_hints(declaration)
     fields: Data = {
-        each.name: (hints[each.name], _field(each)) for each in settings.declared(section, declaration) if each.stored
+        each.name: (hints[each.name], _field(each))
+        for each in settings.declared(section, declaration)
+        if each.stored
     }
-    return create_model(name, __base__=base, __module__=__name__, __doc__=declaration.__doc__, **fields)
+    return create_model(
+        name, __base__=base, __module__=__name__, __doc__=declaration.__doc__, **fields
+    )
 
 
 def _field(one: settings.Setting) -> Any:
@@ -256,7 +289,8 @@ class Oracle(Section):
     use: str | None = Field(default=None, pattern=r"^[\w.]+:\w+$")
     name: str = Field(default="", max_length=40, description="its name in results")
     folder: Path | None = Field(
-        default=None, description="where the command starts or the module lies, if not in the scenario's folder"
+        default=None,
+        description="where the command starts or the module lies, if not in the scenario's folder",
     )
 
     @model_validator(mode="after")

@@ -17,7 +17,9 @@ def height_at(terrain: Terrain, x: Floats, y: Floats) -> Floats:
     """The heights (...) m of the surface at `x` and `y` (...) m in its frame; NaN where there is no ground."""
     rows, columns = terrain.heights.shape
     length, width = terrain.size
-    return bilinear(terrain.heights, (y / width + 0.5) * (rows - 1), (x / length + 0.5) * (columns - 1))
+    return bilinear(
+        terrain.heights, (y / width + 0.5) * (rows - 1), (x / length + 0.5) * (columns - 1)
+    )
 
 
 def bilinear(grid: Floats, row: Floats, column: Floats) -> Floats:
@@ -38,10 +40,14 @@ def height_above(terrain: Terrain, pose: Pose, places: Floats) -> float:
 
 def surface(terrain: Terrain) -> Mesh:
     """The triangles of terrain, as they are drawn."""
-    rows, columns = (np.linspace(0, count - 1, min(count, MOST_DRAWN)) for count in terrain.heights.shape)
+    rows, columns = (
+        np.linspace(0, count - 1, min(count, MOST_DRAWN)) for count in terrain.heights.shape
+    )
     heights = bilinear(terrain.heights, rows[:, None], columns)
     x, y = (np.linspace(-0.5, 0.5, count) for count in heights.shape[::-1])
-    vertices = np.stack([*np.meshgrid(x * terrain.size[0], y * terrain.size[1]), heights], axis=-1).reshape(-1, 3)
+    vertices = np.stack(
+        [*np.meshgrid(x * terrain.size[0], y * terrain.size[1]), heights], axis=-1
+    ).reshape(-1, 3)
     number = np.arange(heights.size).reshape(heights.shape)
     first = number[:-1, :-1]
     beside = number[:-1, 1:]

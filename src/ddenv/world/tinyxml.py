@@ -29,7 +29,9 @@ _DECLARATION = re.compile(rb"<\?xml[\s?]")
 _ENCODING = re.compile(rb"""\s*<\?xml\s[^>]*?encoding\s*=\s*["']([^"'>]*)["']""")
 _REFERENCE = re.compile(r"&(?:#x([0-9a-fA-F]+)|#([0-9]+)|(quot|amp|apos|lt|gt));")
 _NAMED = {"quot": '"', "amp": "&", "apos": "'", "lt": "<", "gt": ">"}
-_NO_DOCTYPE = "DOCTYPE is not allowed (its entities can read other files and exhaust memory); remove it"
+_NO_DOCTYPE = (
+    "DOCTYPE is not allowed (its entities can read other files and exhaust memory); remove it"
+)
 
 
 class NotXml(Exception):
@@ -120,7 +122,9 @@ def _encoding(text: bytes, start: int) -> str:
     except (LookupError, ValueError):
         characters = ""
     if len(characters) != 256 or not characters.startswith(bytes(range(128)).decode()):
-        raise NotXml(f"cannot be decoded: the encoding '{name[:40]}' is not supported; save it as UTF-8")
+        raise NotXml(
+            f"cannot be decoded: the encoding '{name[:40]}' is not supported; save it as UTF-8"
+        )
     return name
 
 
@@ -219,7 +223,10 @@ class _Scanner:
             return False
         innermost = self.open[-1]
         if innermost.tag != name:
-            raise self.fault(start, f"</{_short(name)}> closes <{_short(innermost.tag)}> of line {innermost.line}")
+            raise self.fault(
+                start,
+                f"</{_short(name)}> closes <{_short(innermost.tag)}> of line {innermost.line}",
+            )
         self._close()
         return True
 
@@ -229,7 +236,9 @@ class _Scanner:
         while found := _ATTRIBUTE.match(self.text, at):
             name = self._raw(*found.span(1))
             if name in attributes:
-                raise self.fault(found.start(1), f"attribute '{_short(name)}' is given twice in <{_short(tag)}>")
+                raise self.fault(
+                    found.start(1), f"attribute '{_short(name)}' is given twice in <{_short(tag)}>"
+                )
             attributes[name] = self._decoded(*found.span(found.lastindex or 2), in_attribute=True)
             at = found.end()
         self.at = at
@@ -315,7 +324,12 @@ def _plain_newlines(words: str) -> str:
 
 def _is_character(code: int) -> bool:
     """Whether XML has the character `code`: control characters and halves of pairs are none."""
-    return code in (0x9, 0xA, 0xD) or 0x20 <= code <= 0xD7FF or 0xE000 <= code <= 0xFFFD or 0x10000 <= code <= 0x10FFFF
+    return (
+        code in (0x9, 0xA, 0xD)
+        or 0x20 <= code <= 0xD7FF
+        or 0xE000 <= code <= 0xFFFD
+        or 0x10000 <= code <= 0x10FFFF
+    )
 
 
 def _short(name: str) -> str:

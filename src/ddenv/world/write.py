@@ -50,7 +50,9 @@ def without(world: World, removed: frozenset[str]) -> bytes:
     unknown = removed.difference(world.names)
     if unknown:
         raise ValueError(f"no such model: {sorted(unknown)[0]}")
-    spans = [(*span, b"") for model in world.models if model.name in removed for span in model.spans]
+    spans = [
+        (*span, b"") for model in world.models if model.name in removed for span in model.spans
+    ]
     spans += [(*one.span, one.instead) for one in world.shared if one.models <= removed]
     kept = []
     at = 0
@@ -70,7 +72,10 @@ def convert(world: World, mesh_folder: str) -> tuple[bytes, dict[str, Mesh]]:
     """`world` as SDF 1.9, and its meshes by the relative paths of their OBJ files, which lie in the folder `mesh_folder`."""
     files: dict[Mesh, str] = {}
     for link in (link for model in world.models for link in model.links):
-        for shape in (*(one.shape for one in link.collisions), *(one.shape for one in link.visuals)):
+        for shape in (
+            *(one.shape for one in link.collisions),
+            *(one.shape for one in link.visuals),
+        ):
             shape = as_mesh(shape)
             if isinstance(shape, Mesh):
                 files.setdefault(shape, f"{mesh_folder}/mesh_{len(files) + 1}.obj")
@@ -108,7 +113,13 @@ def _model(element: Element, model: Model, files: Mapping[Mesh, str]) -> None:
         if said:
             SubElement(element, tag).text = "true"
     _pose(element, model.pose)
-    names = dict(zip((link.name for link in model.links), _unique(link.name for link in model.links), strict=True))
+    names = dict(
+        zip(
+            (link.name for link in model.links),
+            _unique(link.name for link in model.links),
+            strict=True,
+        )
+    )
     for link in model.links:
         _link(SubElement(element, "link", name=names[link.name]), link, model, files)
     joint_names = _unique((joint.name for joint in model.joints), taken=names.values())
@@ -141,7 +152,9 @@ def _link(element: Element, link: Link, model: Model, files: Mapping[Mesh, str])
         _shown(element, own, one, back, files)
 
 
-def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, files: Mapping[Mesh, str]) -> None:
+def _shown(
+    parent: Element, name: str, one: Collision | Visual, back: Pose, files: Mapping[Mesh, str]
+) -> None:
     element = SubElement(parent, "collision" if isinstance(one, Collision) else "visual", name=name)
     _pose(element, back @ one.pose)
     geometry = SubElement(element, "geometry")
@@ -173,7 +186,12 @@ def as_mesh(shape: Shape) -> Shape:
 
 def _axis(holder: Element, axis: Vector, joint: Joint) -> None:
     SubElement(holder, "xyz").text = _numbers(joint.pose.inverse().rotate(axis))
-    limits = {"lower": joint.lower, "upper": joint.upper, "effort": joint.effort, "velocity": joint.velocity}
+    limits = {
+        "lower": joint.lower,
+        "upper": joint.upper,
+        "effort": joint.effort,
+        "velocity": joint.velocity,
+    }
     if any(map(math.isfinite, limits.values())):
         limit = SubElement(holder, "limit")
         for tag, value in limits.items():
@@ -209,7 +227,9 @@ def _pose(parent: Element, pose: Pose) -> None:
         if any(pose.position) or angles[2]:
             SubElement(parent, "pose").text = _numbers((*pose.position, *angles))
         return
-    SubElement(parent, "pose", rotation_format="quat_xyzw").text = _numbers((*pose.position, x, y, z, w))
+    SubElement(parent, "pose", rotation_format="quat_xyzw").text = _numbers(
+        (*pose.position, x, y, z, w)
+    )
 
 
 def _numbers(values: Iterable[float]) -> str:

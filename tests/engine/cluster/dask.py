@@ -48,7 +48,15 @@ class Cluster:
         self.scheduler = self._start("scheduler", *words[:3])
 
     def start_worker(self, **environment: str) -> subprocess.Popen[bytes]:
-        words = (self.address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(self.folder))
+        words = (
+            self.address,
+            "--nthreads",
+            "1",
+            "--no-nanny",
+            "--no-dashboard",
+            "--local-directory",
+            str(self.folder),
+        )
         self.workers.append(self._start("worker", *words, **environment))
         return self.workers[-1]
 

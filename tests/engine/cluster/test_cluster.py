@@ -20,7 +20,9 @@ Recording.trajectory = lambda self: ours(self) + 1e-12
 """
 
 # Each waits a minute or more for Dask's programs.
-LONG = pytest.mark.skipif(not os.environ.get("DDENV_CLUSTER"), reason="takes minutes; DDENV_CLUSTER=1 runs it")
+LONG = pytest.mark.skipif(
+    not os.environ.get("DDENV_CLUSTER"), reason="takes minutes; DDENV_CLUSTER=1 runs it"
+)
 
 
 @pytest.fixture
@@ -48,7 +50,9 @@ def ended(program):
 
 def check_same(run, other):
     """Two runs have the same end, and each test of the first was made once."""
-    tests = [(test, state_of(run).tests[number].seed) for number, test in enumerate(finished_tests(run))]
+    tests = [
+        (test, state_of(run).tests[number].seed) for number, test in enumerate(finished_tests(run))
+    ]
     assert story(state_of(run)) == story(state_of(other))
     assert state_of(run).certified == state_of(other).certified
     assert len(tests) == len(set(tests))
@@ -113,7 +117,9 @@ def test_a_run_waits_for_a_lost_scheduler_and_goes_on_with_the_next_one(cluster,
 
 @LONG
 @pytest.mark.programs
-def test_the_tests_of_a_killed_engine_end_and_the_next_one_uses_the_same_workers(cluster, held, home):
+def test_the_tests_of_a_killed_engine_end_and_the_next_one_uses_the_same_workers(
+    cluster, held, home
+):
     cluster.start_worker(), cluster.start_worker()
     held.hold()
     run = home / "there.ddenv"
@@ -171,7 +177,9 @@ def test_a_scheduler_may_ask_for_certificates(held, home, tmp_path, monkeypatch)
         # Without keys nobody is let in.
         monkeypatch.delenv("DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT")
         monkeypatch.delenv("DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY")
-        refused = ddenv("run", held.file, "--output", home / "no.ddenv", "--trust", "--cluster", cluster.address)
+        refused = ddenv(
+            "run", held.file, "--output", home / "no.ddenv", "--trust", "--cluster", cluster.address
+        )
         assert refused.returncode == 2
         assert "no Dask scheduler can be used there" in refused.stderr
         assert "Traceback" not in refused.stderr

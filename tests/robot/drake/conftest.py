@@ -22,7 +22,15 @@ def piece(name: str, shape: Shape, pose: Pose) -> Collision:
 
 
 def static(name: str, *collisions: Collision) -> Model:
-    return Model(name=name, pose=Pose(), static=True, links=(Link(name="link", pose=Pose(), inertia=None, collisions=collisions, visuals=()),), joints=(), spans=(), line=1)
+    return Model(
+        name=name,
+        pose=Pose(),
+        static=True,
+        links=(Link(name="link", pose=Pose(), inertia=None, collisions=collisions, visuals=()),),
+        joints=(),
+        spans=(),
+        line=1,
+    )
 
 
 @pytest.fixture(scope="session")
@@ -30,7 +38,11 @@ def drive(world_of, husky, scenario_of) -> Callable[..., RunResult]:
     """A run of the Husky from the origin of `frame`, over the road and onto what lies ahead."""
 
     def run(
-        *models: Model, frame: Pose = HERE, robot: Model = husky, speed: float = 0.5, timeout: float = 12.0
+        *models: Model,
+        frame: Pose = HERE,
+        robot: Model = husky,
+        speed: float = 0.5,
+        timeout: float = 12.0,
     ) -> RunResult:
         start = frame @ Pose((0.0, 0.0, 0.14))
         goal = frame @ Pose((3.0, 0.0, 0.0))
@@ -43,6 +55,8 @@ def drive(world_of, husky, scenario_of) -> Callable[..., RunResult]:
         )
         road = static("road", piece("road", ROAD, frame @ Pose((EDGE - 3.0, 0.0, -0.05))))
         world: World = replace(world_of(ground=False), models=(road, *models))
-        return Template(world, robot, scenario).run(frozenset(model.name for model in world.models), seed=1)
+        return Template(world, robot, scenario).run(
+            frozenset(model.name for model in world.models), seed=1
+        )
 
     return run

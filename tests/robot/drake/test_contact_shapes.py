@@ -41,7 +41,11 @@ def rolling_radius(wheel: Wheel) -> float:
     places = np.array([part.pose.position for part in tyre(wheel)])
     widths = np.array([part.shape.radius for part in tyre(wheel)])
     turns = np.linspace(0.0, math.tau, 7201)
-    return float(np.mean([(places[:, :2] @ (math.cos(turn), math.sin(turn)) + widths).max() for turn in turns]))
+    return float(
+        np.mean(
+            [(places[:, :2] @ (math.cos(turn), math.sin(turn)) + widths).max() for turn in turns]
+        )
+    )
 
 
 @given(radii, shares)
@@ -118,7 +122,11 @@ def test_a_prism_of_boxes_fills_a_cylinder(radius, length, rolls):
 
 def test_spheres_see_a_static_cylinder_and_boxes_a_prism():
     round_one, flat_one = cylinder(0.3, 1.0, "static")
-    assert (round_one.shape, round_one.touches, flat_one.touches) == (Cylinder(0.3, 1.0), "spheres", "others")
+    assert (round_one.shape, round_one.touches, flat_one.touches) == (
+        Cylinder(0.3, 1.0),
+        "spheres",
+        "others",
+    )
     low, high = shape_bounds(flat_one.shape, Pose())
     assert high == pytest.approx([0.3, 0.3, 0.5], abs=0.001) and low == pytest.approx(-high)
 
@@ -130,19 +138,25 @@ def test_what_rolls_stays_within_its_own_size(shape):
     low, high = shape_bounds(shape, Pose())
     boxes = [shape_bounds(part.shape, part.pose) for part in parts]
     # A box's own box is wider than the box where it is turned: only the spheres are compared.
-    spheres = [box for box, part in zip(boxes, parts, strict=True) if isinstance(part.shape, Sphere)]
+    spheres = [
+        box for box, part in zip(boxes, parts, strict=True) if isinstance(part.shape, Sphere)
+    ]
     assert spheres
     assert (np.min([one for one, _ in spheres], axis=0) > low - 5e-4).all()
     assert (np.max([one for _, one in spheres], axis=0) < high + 5e-4).all()
 
 
-turns = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda parts: sum(part**2 for part in parts) > 0.01)
+turns = st.tuples(*[st.floats(-1, 1)] * 4).filter(
+    lambda parts: sum(part**2 for part in parts) > 0.01
+)
 sizes = st.tuples(*[st.floats(0.02, 5.0)] * 3)
 
 
 @given(sizes, turns)
 def test_a_mesh_that_is_a_box_becomes_one(size, turn):
-    corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size
+    corners = (
+        np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size
+    )
     ((shape, pose),) = pieces.__wrapped__(mesh(Rotation.from_quat(turn).apply(corners) + PLACE))
     assert isinstance(shape, Box)
     assert sorted(shape.size) == pytest.approx(sorted(size), rel=1e-6)

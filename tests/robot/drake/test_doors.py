@@ -88,7 +88,9 @@ def starts() -> Iterator[Pose]:
     """Some straight ahead of the door, some of the wall."""
     random = np.random.default_rng(1)
     for _ in range(STARTS):
-        yield Pose.from_rpy(0.0, random.uniform(-1.2, 1.2), 0.0, 0.0, 0.0, random.uniform(-0.3, 0.3))
+        yield Pose.from_rpy(
+            0.0, random.uniform(-1.2, 1.2), 0.0, 0.0, 0.0, random.uniform(-0.3, 0.3)
+        )
 
 
 @pytest.mark.slow

@@ -18,13 +18,20 @@ from ddenv.world.pose import Pose
 from ddenv.world.scenario import Controller, Wheels
 from tests.robot.conftest import joint_of, link_of
 
-ALL = Wheels(left=("front_left_wheel", "rear_left_wheel"), right=("front_right_wheel", "rear_right_wheel"))
+ALL = Wheels(
+    left=("front_left_wheel", "rear_left_wheel"), right=("front_right_wheel", "rear_right_wheel")
+)
 FRONT = Wheels(left=("front_left_wheel",), right=("front_right_wheel",))
 
 
 def test_the_husky_has_four_wheels(husky):
     drive = find_drive(husky)
-    assert drive.joints == ("front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_right_wheel")
+    assert drive.joints == (
+        "front_left_wheel",
+        "front_right_wheel",
+        "rear_left_wheel",
+        "rear_right_wheel",
+    )
     assert drive.left == (True, False, True, False)
     assert drive.radius == pytest.approx(0.1651)
     assert drive.track == pytest.approx(0.5708)
@@ -48,16 +55,23 @@ def test_wheel_speeds_of_a_skid_steered_turn(husky):
 def way_of(*poses: tuple[float, float, float, float, float]) -> np.ndarray:
     """Rows of a robot at x, y, z (m), yaw and pitch (rad), one a second."""
     places = [Pose.from_rpy(x, y, z, 0.0, pitch, yaw) for x, y, z, yaw, pitch in poses]
-    return np.array([(float(time), *each.position, *each.quaternion) for time, each in enumerate(places)])
+    return np.array(
+        [(float(time), *each.position, *each.quaternion) for time, each in enumerate(places)]
+    )
 
 
 def test_wheels_roll_as_far_as_the_way_makes_them(husky):
     drive = find_drive(husky)
     rise = math.radians(30)
     # Along y and up a slope, then back down.
-    low, high = (0.0, 0.0, 0.0, math.pi / 2, -rise), (0.0, math.cos(rise), math.sin(rise), math.pi / 2, -rise)
+    low, high = (
+        (0.0, 0.0, 0.0, math.pi / 2, -rise),
+        (0.0, math.cos(rise), math.sin(rise), math.pi / 2, -rise),
+    )
     up = way_of(low, high, low)
-    assert rolled(husky, drive, 0.5, up) == pytest.approx(np.array([[0, 0], [1, 1], [0, 0]]) / drive.radius)
+    assert rolled(husky, drive, 0.5, up) == pytest.approx(
+        np.array([[0, 0], [1, 1], [0, 0]]) / drive.radius
+    )
     # A turn on the spot to the left, through south, of which half is lost: the wheels do what they were commanded.
     around = way_of((1, 2, 0, 3.0, 0), (1, 2, 0, 3.0 + 1.0, 0))
     speeds = drive.wheel_speeds(Twist(0.0, 1.0), 0.5)
@@ -66,7 +80,10 @@ def test_wheels_roll_as_far_as_the_way_makes_them(husky):
 
 
 def test_what_turns_about_the_opposite_axis_turns_the_other_way(husky, world_of, scenario_of):
-    joints = tuple(replace(joint, axis=(0.0, -1.0, 0.0)) if "right" in joint.name else joint for joint in husky.joints)
+    joints = tuple(
+        replace(joint, axis=(0.0, -1.0, 0.0)) if "right" in joint.name else joint
+        for joint in husky.joints
+    )
     mixed = replace(husky, joints=joints)
     drive = find_drive(mixed)
     assert drive.signs == (1.0, -1.0, 1.0, -1.0)
@@ -83,8 +100,12 @@ def turned(robot: Model, pose: Pose) -> Model:
         collisions = tuple(replace(one, pose=pose @ one.pose) for one in each.collisions)
         return replace(each, pose=pose @ each.pose, collisions=collisions)
 
-    joints = tuple(replace(each, pose=pose @ each.pose, axis=pose.rotate(each.axis)) for each in robot.joints)
-    return replace(robot, pose=pose @ robot.pose, links=tuple(map(link, robot.links)), joints=joints)
+    joints = tuple(
+        replace(each, pose=pose @ each.pose, axis=pose.rotate(each.axis)) for each in robot.joints
+    )
+    return replace(
+        robot, pose=pose @ robot.pose, links=tuple(map(link, robot.links)), joints=joints
+    )
 
 
 def test_sides_and_footprint_are_seen_from_the_model(husky):
@@ -93,7 +114,9 @@ def test_sides_and_footprint_are_seen_from_the_model(husky):
     assert find_drive(there).signs == find_drive(husky).signs
     assert footprint(there) == pytest.approx(footprint(husky))
     # Its bumpers are 0.9874 m apart, its tyres stand out by half of their width.
-    assert footprint(husky) == pytest.approx((0.4937, 0.4937, 0.2854 + 0.1143 / 2, 0.2854 + 0.1143 / 2), abs=1e-6)
+    assert footprint(husky) == pytest.approx(
+        (0.4937, 0.4937, 0.2854 + 0.1143 / 2, 0.2854 + 0.1143 / 2), abs=1e-6
+    )
 
 
 REFUSED = {
@@ -140,7 +163,9 @@ def test_a_robot_without_wheels_is_refused(husky):
         find_drive(replace(husky, joints=()))
     with pytest.raises(UserError, match="left and right"):
         find_drive(replace(husky, joints=husky.joints[::2]))
-    with pytest.raises(UserError, match=r"robot.wheels.left: there is no joint.*none of its joints turns"):
+    with pytest.raises(
+        UserError, match=r"robot.wheels.left: there is no joint.*none of its joints turns"
+    ):
         find_drive(replace(husky, joints=()), FRONT)
 
 
@@ -148,32 +173,46 @@ def on_wheels_of(husky: Model, shape: Shape) -> Model:
     def with_shape(link):
         return replace(link, collisions=tuple(replace(one, shape=shape) for one in link.collisions))
 
-    return replace(husky, links=tuple(with_shape(link) if "wheel" in link.name else link for link in husky.links))
+    return replace(
+        husky,
+        links=tuple(with_shape(link) if "wheel" in link.name else link for link in husky.links),
+    )
 
 
 def tyre(radius: float) -> Mesh:
     """A wheel of 24 corners along its frame's z axis."""
     angles = np.linspace(0.0, math.tau, 24, endpoint=False)
-    rims = [np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(24, z)]) for z in (-0.3, 0.3)]
+    rims = [
+        np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(24, z)])
+        for z in (-0.3, 0.3)
+    ]
     return Mesh("tyre", np.vstack(rims), np.zeros((0, 3), int))
 
 
 @pytest.mark.parametrize(
-    "shape", [Sphere(0.2), Capsule(0.2, 0.1), Ellipsoid((0.2, 0.2, 0.3)), tyre(0.2)], ids=lambda one: type(one).__name__
+    "shape",
+    [Sphere(0.2), Capsule(0.2, 0.1), Ellipsoid((0.2, 0.2, 0.3)), tyre(0.2)],
+    ids=lambda one: type(one).__name__,
 )
 def test_the_radius_of_wheels_of_any_round_shape(husky, shape):
     assert find_drive(on_wheels_of(husky, shape)).radius == pytest.approx(0.2)
 
 
 def test_square_wheels_are_refused(husky):
-    with pytest.raises(UserError, match="'front_left_wheel_link' has no round collision: a cylinder"):
+    with pytest.raises(
+        UserError, match="'front_left_wheel_link' has no round collision: a cylinder"
+    ):
         find_drive(on_wheels_of(husky, Box((0.3, 0.3, 0.1))))
 
 
 def test_joints_that_are_not_named_turn_freely(husky, world_of, scenario_of):
     """Two driven wheels, and behind them two that only roll."""
     scenario = scenario_of(
-        robot={"model": "husky.sdf", "spawn": {"x": 0, "y": 0, "z": 0.14}, "wheels": FRONT.model_dump()}
+        robot={
+            "model": "husky.sdf",
+            "spawn": {"x": 0, "y": 0, "z": 0.14},
+            "wheels": FRONT.model_dump(),
+        }
     )
     template = Template(world_of(), husky, scenario)
     assert template.context.built.plant.num_actuators() == 2
@@ -188,8 +227,14 @@ def test_links_without_mass_are_frames_of_what_they_are_fixed_to(husky, world_of
     framed = replace(husky, links=(*husky.links, rod, tip), joints=(*husky.joints, *fixed))
     assert Template(world_of(), framed, scenario_of()).run(frozenset(), seed=1).outcome == "pass"
     loose = replace(framed, joints=(*husky.joints, replace(fixed[0], kind="continuous"), fixed[1]))
-    wheels = {"model": "husky.sdf", "spawn": {"x": 0, "y": 0, "z": 0.14}, "wheels": ALL.model_dump()}
-    with pytest.raises(UserError, match=r"link 'rod' of the moving model 'husky' has no <inertial>"):
+    wheels = {
+        "model": "husky.sdf",
+        "spawn": {"x": 0, "y": 0, "z": 0.14},
+        "wheels": ALL.model_dump(),
+    }
+    with pytest.raises(
+        UserError, match=r"link 'rod' of the moving model 'husky' has no <inertial>"
+    ):
         Template(world_of(), loose, scenario_of(robot=wheels))
 
 

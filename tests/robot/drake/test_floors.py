@@ -29,7 +29,9 @@ THICK = 0.5
 
 def box_mesh(size: tuple[float, float, float]) -> Mesh:
     """A wedge-shaped slab with the box's front, top and bottom edges, which is no box: its back leans out by a centimetre."""
-    corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size
+    corners = (
+        np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size
+    )
     corners[(corners[:, 0] > 0) & (corners[:, 2] < 0), 0] += 0.01
     return Mesh(f"slab {size}", *convex_hull(corners))
 
@@ -94,17 +96,24 @@ def highest(climbs: Callable[[float], bool]) -> float:
         pytest.param(0.4, 40.0, 0.2, marks=pytest.mark.rates),
     ],
 )
-def test_a_wheel_climbs_what_a_ball_of_its_size_climbs(drive, husky, monkeypatch, mu, effort, share):
+def test_a_wheel_climbs_what_a_ball_of_its_size_climbs(
+    drive, husky, monkeypatch, mu, effort, share
+):
     # Against a box a ball is exact. It is too wide for a wheel, but nothing stands beside the robot here.
     def rough(parts: list[Collision]) -> Model:
         return static("platform", *(replace(part, mu=mu) for part in parts))
 
     wheels = tuple(replace(joint, effort=effort) for joint in husky.joints)
-    bare = tuple(replace(link, collisions=()) if link.name == "base_link" else link for link in husky.links)
+    bare = tuple(
+        replace(link, collisions=()) if link.name == "base_link" else link for link in husky.links
+    )
     robot = replace(husky, joints=wheels, links=bare)
 
     def climbs(height: float) -> bool:
-        return drive(rough(platform(height, [], [])), robot=robot, speed=0.2, timeout=40.0).outcome == "pass"
+        return (
+            drive(rough(platform(height, [], [])), robot=robot, speed=0.2, timeout=40.0).outcome
+            == "pass"
+        )
 
     as_tyre = highest(climbs)
     monkeypatch.setattr(contact_shapes, "tyre", lambda wheel: [Placed(Sphere(wheel.radius), HERE)])
@@ -127,7 +136,9 @@ def test_a_lip_does_not_stop_a_slow_robot(drive, height):
 
 
 @pytest.mark.parametrize("mass", [1.0, 100.0, 1e4, 1e5])
-@pytest.mark.parametrize("shape", [Box((0.6, 0.6, 0.4)), Cylinder(0.3, 0.4)], ids=["box", "cylinder"])
+@pytest.mark.parametrize(
+    "shape", [Box((0.6, 0.6, 0.4)), Cylinder(0.3, 0.4)], ids=["box", "cylinder"]
+)
 def test_nothing_sinks_by_more_than_5_mm(world_of, husky, scenario_of, mass, shape):
     # As large as water of this mass.
     grown = (mass / 100.0) ** (1 / 3)
@@ -138,7 +149,21 @@ def test_nothing_sinks_by_more_than_5_mm(world_of, husky, scenario_of, mass, sha
     place = Pose((0.0, 9.0, height + 0.005))
     inertia = Inertia(mass, place, (0.05 * mass * grown**2,) * 3)
     thing = Model(
-        name="thing", pose=place, static=False, links=(Link(name="link", pose=place, inertia=inertia, collisions=(Collision(name="c", shape=body, pose=place, mu=1.0),), visuals=()),), joints=(), spans=(), line=1
+        name="thing",
+        pose=place,
+        static=False,
+        links=(
+            Link(
+                name="link",
+                pose=place,
+                inertia=inertia,
+                collisions=(Collision(name="c", shape=body, pose=place, mu=1.0),),
+                visuals=(),
+            ),
+        ),
+        joints=(),
+        spans=(),
+        line=1,
     )
     world = world_of()
     scenario = scenario_of(failure={"timeout": 2.0}, goal={"x": 9, "y": 0})
@@ -163,7 +188,10 @@ def test_a_robot_of_a_tonne_and_a_half_stands_on_the_ground(drive, husky):
 @given(order=st.permutations(range(6)))
 def test_the_order_of_models_changes_no_bit(add, world_of, husky, scenario_of, order):
     # A leaning pile that the robot drives into, and posts beside it.
-    loose = [cube(f"crate_{number}", 1.6, 0.29 * number - 0.45, 0.16 + 0.1 * number) for number in range(4)]
+    loose = [
+        cube(f"crate_{number}", 1.6, 0.29 * number - 0.45, 0.16 + 0.1 * number)
+        for number in range(4)
+    ]
     posts = [cube(f"post_{number}", 2.5, 2.0 * number - 1.0, mass=None) for number in range(2)]
     models = [*loose, *posts]
 

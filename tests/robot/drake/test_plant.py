@@ -21,7 +21,11 @@ NOWHERE = {"failure": {"timeout": 2.0}, "goal": {"x": 9, "y": 0}}
 def hung(kind: str, offset=(0.5, 0.0, 0.0), **changes: object) -> Model:
     """A cube that hangs on the world, `offset` away from its joint."""
     place = tuple(float(a + b) for a, b in zip(HINGE, offset, strict=True))
-    return model_of("thing", link_of("a", CUBE, Pose(place)), joints=(joint_of(kind, "world", "a", HINGE, **changes),))
+    return model_of(
+        "thing",
+        link_of("a", CUBE, Pose(place)),
+        joints=(joint_of(kind, "world", "a", HINGE, **changes),),
+    )
 
 
 @pytest.fixture
@@ -32,7 +36,9 @@ def motion(world_of, add, husky, scenario_of):
     """
 
     def run(model: Model) -> tuple[np.ndarray, np.ndarray]:
-        template = Template(add(world_of(), model, replace(model, name="twin")), husky, scenario_of(**NOWHERE))
+        template = Template(
+            add(world_of(), model, replace(model, name="twin")), husky, scenario_of(**NOWHERE)
+        )
         rows = template.run(frozenset({model.name}), seed=1).motions[model.name]
         return rows[:, 1:4] - HINGE, rows
 
@@ -62,10 +68,14 @@ def test_damping_slows_a_slider_down(motion):
     assert np.diff(way[-5:, 2]) / 0.1 == pytest.approx(np.full(4, -9.81 / 30.0), rel=0.01)
 
 
-@pytest.mark.parametrize("offset", [(0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.3, 0.0, 0.4), (0.3, 0.3, 0.2)])
+@pytest.mark.parametrize(
+    "offset", [(0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.3, 0.0, 0.4), (0.3, 0.3, 0.2)]
+)
 def test_a_ball_joint_swings_in_any_direction(motion, offset):
     way, _ = motion(hung("ball", offset))
-    assert np.linalg.norm(way, axis=1) == pytest.approx(np.full(len(way), np.linalg.norm(offset)), abs=1e-6)
+    assert np.linalg.norm(way, axis=1) == pytest.approx(
+        np.full(len(way), np.linalg.norm(offset)), abs=1e-6
+    )
     # It swings through below its joint, to the other side.
     assert way[:, 2].min() < -0.9 * np.linalg.norm(offset)
     assert (way[:, :2] @ offset[:2]).min() < -0.1 * np.linalg.norm(offset)
@@ -73,7 +83,9 @@ def test_a_ball_joint_swings_in_any_direction(motion, offset):
 
 def test_a_universal_joint_turns_about_both_its_axes_only(motion):
     # Its axes need not be those of the world. Gravity turns nothing about a vertical one.
-    way, _ = motion(hung("universal", (0.6, 0.8, 0.0), axis=(0.0, 0.0, 1.0), axis2=(-0.8, 0.6, 0.0)))
+    way, _ = motion(
+        hung("universal", (0.6, 0.8, 0.0), axis=(0.0, 0.0, 1.0), axis2=(-0.8, 0.6, 0.0))
+    )
     assert way @ (-0.8, 0.6, 0.0) == pytest.approx(np.zeros(len(way)), abs=1e-6)
     assert way[:, 2].min() < -0.9
     axes = {"axis": (1.0, 0.0, 0.0), "axis2": (0.0, 1.0, 0.0)}
@@ -86,11 +98,15 @@ def test_a_universal_joint_turns_about_both_its_axes_only(motion):
 
 def test_a_joint_without_play_is_fixed(world_of, add, husky, scenario_of):
     held = hung("revolute", axis=(0.0, 1.0, 0.0), lower=0.0, upper=0.0)
-    result = Template(add(world_of(), held), husky, scenario_of(**NOWHERE)).run(frozenset({"thing"}), seed=1)
+    result = Template(add(world_of(), held), husky, scenario_of(**NOWHERE)).run(
+        frozenset({"thing"}), seed=1
+    )
     assert result.motions == {}
 
 
-def test_what_is_fixed_in_the_world_stops_the_robot_and_can_be_removed(world_of, add, husky, scenario_of):
+def test_what_is_fixed_in_the_world_stops_the_robot_and_can_be_removed(
+    world_of, add, husky, scenario_of
+):
     post = model_of(
         "post",
         link_of("foot", Box((0.3, 3.0, 1.0)), Pose((2.0, 0.0, 0.5))),
@@ -105,7 +121,10 @@ def test_what_is_fixed_in_the_world_stops_the_robot_and_can_be_removed(world_of,
     assert blocked.outcome == "failed"
     assert blocked.trajectory[:, 1].max() < 1.6
     assert template.run(frozenset(), seed=1).outcome == "pass"
-    assert template.run(frozenset({"post"}), seed=1).trajectory.tobytes() == blocked.trajectory.tobytes()
+    assert (
+        template.run(frozenset({"post"}), seed=1).trajectory.tobytes()
+        == blocked.trajectory.tobytes()
+    )
 
 
 def test_only_joints_that_turn_about_one_axis_are_wheels(world_of, husky, scenario_of):
@@ -123,7 +142,9 @@ def test_a_board_that_is_hit_moves_and_its_motion_is_recorded(world_of, husky, s
         box("board", "1.2 0 0.02 0 0 1.57", "0.9 0.09 0.04", mass=2.0),
         box("crate", "1.6 -3 0.25 0 0 0", "0.5 0.5 0.5", mass=10.0),
     )
-    template = Template(world_of(board, crate), husky, scenario_of(failure={"timeout": 4.0}, goal={"x": 9, "y": 0}))
+    template = Template(
+        world_of(board, crate), husky, scenario_of(failure={"timeout": 4.0}, goal={"x": 9, "y": 0})
+    )
     result = template.run(frozenset({"board", "crate"}), seed=1)
     rows = result.motions["board"]
     assert rows[:, 0] == pytest.approx(result.trajectory[:, 0])
@@ -137,7 +158,9 @@ def test_a_board_that_is_hit_moves_and_its_motion_is_recorded(world_of, husky, s
 
 def test_a_model_of_several_links_moves_as_one(world_of, husky, scenario_of, box):
     inertia = "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>"
-    side = "<collision name='c'><geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision>"
+    side = (
+        "<collision name='c'><geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision>"
+    )
     pair = (
         f"<model name='pair'><pose>0 3 1 0 0 0</pose><link name='a'>{inertia}{side}</link>"
         f"<link name='b'><pose>0 0 0.2 0 0 0</pose>{inertia}{side}</link>"

@@ -19,7 +19,12 @@ EVERYTHING = 10**9
 @pytest.fixture
 def world(world_of, add) -> World:
     """In the robot's way a cube that it pushes against a wall; a pile that falls far away onto a shelf; crates all around."""
-    crates = [cube(f"crate {x} {y}", 4 * x, 4 * y, mass=None) for x in range(-4, 8) for y in range(-4, 5) if y]
+    crates = [
+        cube(f"crate {x} {y}", 4 * x, 4 * y, mass=None)
+        for x in range(-4, 8)
+        for y in range(-4, 5)
+        if y
+    ]
     shelf = model_of("shelf", link_of("link", Box((1.0, 1.0, 0.3)), Pose((1.0, 30.0, 0.15)), None))
     wall = model_of("wall", link_of("link", Box((0.2, 3.0, 0.3)), Pose((4.5, 0.0, 0.15)), None))
     loose = cube("pushed", 1.2, 0.1), cube("falls", 1.0, 30.0, 0.8)
@@ -29,7 +34,12 @@ def world(world_of, add) -> World:
 @pytest.fixture
 def scenario(scenario_of) -> Scenario:
     sensors = {"lidar": {"beams": 91, "range": 9.0, "z": 0.0}, "view_range": 3.0}
-    return scenario_of(failure={"timeout": 4.0}, goal={"x": 9, "y": 0}, sensors=sensors, simulation={"time_step": 0.01})
+    return scenario_of(
+        failure={"timeout": 4.0},
+        goal={"x": 9, "y": 0},
+        sensors=sensors,
+        simulation={"time_step": 0.01},
+    )
 
 
 @pytest.fixture
@@ -50,7 +60,9 @@ def still(variants: Variants) -> int:
     return len(variants._whole.context.built.static)
 
 
-def test_every_bit_is_the_same_in_a_small_region_in_a_large_one_and_with_everything(variants, world):
+def test_every_bit_is_the_same_in_a_small_region_in_a_large_one_and_with_everything(
+    variants, world
+):
     names = frozenset(world.elements())
     parts = names, names - {"shelf", "crate 0 1"}
     whole, large, small = (variants(width) for width in (EVERYTHING, 8.0, 3.5))
@@ -81,15 +93,23 @@ def test_a_run_that_leaves_the_region_is_made_again_from_its_start_in_a_larger_o
 def test_a_model_that_slides_out_of_the_region_is_stopped_by_what_lies_there(
     world_of, add, variants, husky, scenario, x
 ):
-    ramp = model_of("ramp", link_of("link", Box((0.6, 1.6, 0.1)), Pose.from_rpy(x, 1.2, 0.0, -0.3, 0, 0), None, mu=0.0))
-    slides = model_of("slides", link_of("link", Box((0.3, 0.3, 0.3)), Pose((x, 0.52, 0.52)), mu=0.0))
+    ramp = model_of(
+        "ramp",
+        link_of("link", Box((0.6, 1.6, 0.1)), Pose.from_rpy(x, 1.2, 0.0, -0.3, 0, 0), None, mu=0.0),
+    )
+    slides = model_of(
+        "slides", link_of("link", Box((0.3, 0.3, 0.3)), Pose((x, 0.52, 0.52)), mu=0.0)
+    )
     world = add(world_of(), ramp, slides, cube("stop", x, 5.2, mass=None))
     expected, found = [], []
     for width, results in ((EVERYTHING, expected), (4.0, found)):
         variants(width)
         one = Variants(world, husky, scenario)
         assert ("stop" in one._whole.context.built.static) is (width == EVERYTHING)
-        results += [all_bits(one.run(frozenset(keep), 1)) for keep in (["ramp", "slides", "stop"], ["ramp", "slides"])]
+        results += [
+            all_bits(one.run(frozenset(keep), 1))
+            for keep in (["ramp", "slides", "stop"], ["ramp", "slides"])
+        ]
         assert "stop" in one._whole.context.built.static
     assert found == expected
     assert expected[0][3] != expected[1][3]
@@ -109,7 +129,9 @@ def test_a_small_world_is_in_the_plant_as_a_whole(world, husky, scenario):
     assert len(template.context.built.static) == len(world.models)
 
 
-def test_a_region_has_what_its_edge_cuts_and_all_that_has_no_end(variants, world, add, husky, scenario):
+def test_a_region_has_what_its_edge_cuts_and_all_that_has_no_end(
+    variants, world, add, husky, scenario
+):
     variants(2.0)
     edge = cube("edge", 5.0, 2.1, mass=None), cube("outside", 5.0, 2.3, mass=None)
     static = Variants(add(world, *edge), husky, scenario)._whole.context.built.static

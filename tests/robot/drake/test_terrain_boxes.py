@@ -25,7 +25,9 @@ from tests.tiers import examples
 SIDE = 20.0  # m
 
 
-def terrain_of(height: Callable[[np.ndarray, np.ndarray], np.ndarray], count: int = 81, side: float = SIDE) -> Terrain:
+def terrain_of(
+    height: Callable[[np.ndarray, np.ndarray], np.ndarray], count: int = 81, side: float = SIDE
+) -> Terrain:
     along = np.linspace(-side / 2, side / 2, count)
     return Terrain((side, side), height(*np.meshgrid(along, along)), "terrain")
 
@@ -57,14 +59,19 @@ def top(placed: list[tuple[Box, Pose]], places: np.ndarray) -> np.ndarray:
     steepness=st.floats(0.0, 1.0),
     tolerance=st.sampled_from(TOLERANCES[:3]),
 )
-def test_no_point_of_the_surface_is_off_by_more_than_2_cm(seed, rows, columns, cell, steepness, tolerance):
+def test_no_point_of_the_surface_is_off_by_more_than_2_cm(
+    seed, rows, columns, cell, steepness, tolerance
+):
     random = np.random.default_rng(seed)
     heights = random.uniform(0.0, steepness * cell, (rows, columns))
     size = ((columns - 1) * cell, (rows - 1) * cell * 1.3)
     terrain = Terrain(size, heights, "terrain")
     places = (random.random((500, 2)) - 0.5) * size
     found = top(list(boxes(terrain, HERE, None, tolerance)), places)
-    assert np.abs(found - height_at(terrain, places[:, 0], places[:, 1])).max() <= max(0.02, tolerance) + 1e-9
+    assert (
+        np.abs(found - height_at(terrain, places[:, 0], places[:, 1])).max()
+        <= max(0.02, tolerance) + 1e-9
+    )
 
 
 def test_level_and_tilted_ground_is_one_box_and_a_region_takes_some_of_the_same_boxes():
@@ -82,7 +89,9 @@ def test_level_and_tilted_ground_is_one_box_and_a_region_takes_some_of_the_same_
 def drive(world_of, husky, scenario_of) -> Callable[..., RunResult]:
     """A run of the Husky along x, on ground of one shape that is `height` m high at its start."""
 
-    def run(shape: Shape, pose: Pose = HERE, height: float = 0.0, kind: type = Template) -> RunResult:
+    def run(
+        shape: Shape, pose: Pose = HERE, height: float = 0.0, kind: type = Template
+    ) -> RunResult:
         scenario = scenario_of(
             robot={"model": "husky.sdf", "spawn": {"x": -4.0, "y": 0.0, "z": height + 0.14}},
             goal={"x": 4.0, "y": 0.0, "tolerance": 0.3},
@@ -120,11 +129,15 @@ def test_a_flat_floor_is_the_same_in_400_boxes(drive, monkeypatch):
     assert cut.end_pose[:3] == pytest.approx(one.end_pose[:3], abs=0.02)
 
 
-def test_a_robot_drives_over_hills_in_a_small_region_as_in_a_large_one_and_stops_at_a_trench(drive, monkeypatch):
+def test_a_robot_drives_over_hills_in_a_small_region_as_in_a_large_one_and_stops_at_a_trench(
+    drive, monkeypatch
+):
     over = drive(terrain_of(hills), height=float(hills(np.array(-4.0), np.array(0.0))) + 0.3)
     assert over.outcome == "pass"
     monkeypatch.setattr("ddenv.robot.drake.region.WIDTH", 3.0)
-    again = drive(terrain_of(hills), height=float(hills(np.array(-4.0), np.array(0.0))) + 0.3, kind=Variants)
+    again = drive(
+        terrain_of(hills), height=float(hills(np.array(-4.0), np.array(0.0))) + 0.3, kind=Variants
+    )
     assert bits(again) == bits(over)
     trench = drive(terrain_of(lambda x, _: -0.6 * (np.abs(x) < 0.6)))
     assert trench.outcome == "failed"

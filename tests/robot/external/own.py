@@ -25,7 +25,9 @@ subprocess.Popen([sys.executable, "-c", {STUBBORN!r}])
 """
 
 
-def own_scenario(folder: Path, code: str, words: str = "", wall_timeout: float = PATIENCE, **reduction) -> Scenario:
+def own_scenario(
+    folder: Path, code: str, words: str = "", wall_timeout: float = PATIENCE, **reduction
+) -> Scenario:
     """The scenario of the small world with the Python program `code`, kept in `folder`."""
     (folder / "robot.py").write_text(textwrap.dedent(code))
     return wall(

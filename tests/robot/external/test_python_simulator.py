@@ -67,11 +67,16 @@ JOINTED = """<sdf version="1.9"><world name="w"><model name="post"><static>true<
 
 def test_rows_may_have_the_poses_of_links_at_joints(tmp_path, made):
     (tmp_path / "world.sdf").write_text(JOINTED)
-    at = {"world": tmp_path / "world.sdf", "robot": wall().robot.model_copy(update={"spawn": Spawn(x=9, y=9, z=1)})}
+    at = {
+        "world": tmp_path / "world.sdf",
+        "robot": wall().robot.model_copy(update={"spawn": Spawn(x=9, y=9, z=1)}),
+    }
 
     def run(name):
         rows = f"yield 0.0, AT, {{'{name}': AT}}\n        yield 0.1, AT, {{'{name}': (2, 0, 0, 0, 0, 0, 1)}}\n        return END"
-        return made(written(tmp_path, rows).model_copy(update=at)).run(frozenset({"post", "lever"}), 1)
+        return made(written(tmp_path, rows).model_copy(update=at)).run(
+            frozenset({"post", "lever"}), 1
+        )
 
     assert run("lever::bar").motions["lever::bar"][:, 1].tolist() == [1, 2]
     # A part of a model without joints is none, and a link that is left out with its model neither.
@@ -85,14 +90,21 @@ def test_one_object_gets_the_world_of_each_test_and_its_rows_become_the_run(tmp_
     (tmp_path / "mine.py").write_text(HEAD + SEES)
     simulator = made(scenario)
     run = simulator.run(LEFT, 3, lambda *now: moments.append(now))
-    assert (run.outcome, run.failure, run.seed, run.took_part) == ("failed", "out of time", 3, frozenset({"ball"}))
+    assert (run.outcome, run.failure, run.seed, run.took_part) == (
+        "failed",
+        "out of time",
+        3,
+        frozenset({"ball"}),
+    )
     assert run.trajectory[:, 0] == pytest.approx(np.arange(0, 2.01, 0.1))
     assert run.end_pose == (2.0, 0, 0.3, 0, 0, 0, 1)
     assert set(run.motions) == {"ball"} and run.motions["ball"][-1].tolist() == pytest.approx(
         [1.95, 2, 39, 0, 1, 0, 0, 0]
     )
     # It begins before the simulator does, and then has each row that is kept.
-    assert moments[0] == (0.0, (0, 0, 0.45, 1, 0, 0, 0), {}) and len(moments) == 1 + len(run.trajectory)
+    assert moments[0] == (0.0, (0, 0, 0.45, 1, 0, 0, 0), {}) and len(moments) == 1 + len(
+        run.trajectory
+    )
     assert moments[-1][2] == {"ball": (2, 39, 0, 1, 0, 0, 0)}
     world, text, seed, timeout = simulator._simulator.seen
     assert world.models == ("ground_plane", "deck", "ball") and (seed, timeout) == (3, 5.0)
@@ -109,7 +121,12 @@ def test_one_object_gets_the_world_of_each_test_and_its_rows_become_the_run(tmp_
 
 def test_poses_may_be_returned_and_what_took_part_is_not_guessed(made):
     run = made(run="return ddenv.Ended(True, [(0, AT), (2, AT)])").run(LEFT, 0)
-    assert (run.outcome, run.failure, run.simulated_seconds, run.took_part) == ("pass", "", 2.0, None)
+    assert (run.outcome, run.failure, run.simulated_seconds, run.took_part) == (
+        "pass",
+        "",
+        2.0,
+        None,
+    )
 
 
 ROW = "gave row 1: expected t,x,y,z,qx,qy,qz,qw (s, m, a quaternion), found "
@@ -154,13 +171,22 @@ def test_a_class_that_makes_no_object_is_one_line(tmp_path, monkeypatch, made):
     scenario = written(tmp_path)
     for use, said in (
         ("mine:Min", "module 'mine' has no class 'Min' (did you mean Mine?)"),
-        ("mime:Mine", f"there is no module 'mime' in {tmp_path.resolve()}, nor installed (did you mean mine?)"),
-        ("json:JSONDecoder", "class 'JSONDecoder' of module 'json' has no method run(world, seed, timeout)"),
+        (
+            "mime:Mine",
+            f"there is no module 'mime' in {tmp_path.resolve()}, nor installed (did you mean mine?)",
+        ),
+        (
+            "json:JSONDecoder",
+            "class 'JSONDecoder' of module 'json' has no method run(world, seed, timeout)",
+        ),
     ):
         with pytest.raises(UserError) as caught:
             PythonSimulator(load_parts(scenario)[0], wall(oracle=Oracle(use=use), folder=tmp_path))
         assert str(caught.value) == f"oracle.use: {said}"
-    with pytest.raises(UserError, match=r"^oracle\.use: importing 'mine' raised ZeroDivisionError: .* \(mine\.py:1\)$"):
+    with pytest.raises(
+        UserError,
+        match=r"^oracle\.use: importing 'mine' raised ZeroDivisionError: .* \(mine\.py:1\)$",
+    ):
         made(head="1 / 0\n")
     for begin, said in (
         ("1 / 0", r"raised ZeroDivisionError: .* \(mine\.py:7\)"),

@@ -27,7 +27,12 @@ PASS = "print('0,0,0,0,0,0,0,1'); print('2.5,4,0,0,0,0,0,1')"
 
 def test_exit_code_0_is_a_pass_and_1_a_failure(simulator_of):
     passed = simulator_of(PASS).run(EVERYTHING, 3)
-    assert (passed.outcome, passed.failure, passed.seed, passed.simulated_seconds) == ("pass", "", 3, 2.5)
+    assert (passed.outcome, passed.failure, passed.seed, passed.simulated_seconds) == (
+        "pass",
+        "",
+        3,
+        2.5,
+    )
     assert passed.end_pose == (4, 0, 0, 1, 0, 0, 0)
     assert (passed.motions, passed.first_sensed, passed.first_touched) == ({}, {}, {})
     assert 0 < passed.wall_seconds < 20
@@ -48,13 +53,22 @@ TELL = """
 def test_the_command_gets_the_world_the_seed_and_the_scenario(simulator_of, tmp_path, monkeypatch):
     monkeypatch.setenv("GZ_SIM_RESOURCE_PATH", "/models")
     monkeypatch.delenv("GAZEBO_MODEL_PATH", raising=False)
-    assert simulator_of(TELL, "{world} --seed={seed}").run(frozenset({"deck", "wall"}), 5).outcome == "pass"
+    assert (
+        simulator_of(TELL, "{world} --seed={seed}").run(frozenset({"deck", "wall"}), 5).outcome
+        == "pass"
+    )
     (world, seed), reported, text, cwd, stdin = eval((tmp_path / "reported").read_text())
     assert (seed, cwd, stdin) == ("--seed=5", str(tmp_path), "")
     assert "far_box" not in text and "deck" in text and "ground_plane" in text
-    assert (reported["DDENV_WORLD"], reported["DDENV_SEED"], reported["DDENV_TIMEOUT"]) == (world, "5", "5")
+    assert (reported["DDENV_WORLD"], reported["DDENV_SEED"], reported["DDENV_TIMEOUT"]) == (
+        world,
+        "5",
+        "5",
+    )
     assert (reported["DDENV_SPAWN"], reported["DDENV_GOAL"]) == ("0 0 0.45 0", "4 0 0.5")
-    assert reported["GZ_SIM_RESOURCE_PATH"] == os.pathsep.join([str(DATA), str(DATA / "models"), "/models"])
+    assert reported["GZ_SIM_RESOURCE_PATH"] == os.pathsep.join(
+        [str(DATA), str(DATA / "models"), "/models"]
+    )
     assert reported["GAZEBO_MODEL_PATH"] == os.pathsep.join([str(DATA), str(DATA / "models")])
 
 
@@ -107,13 +121,23 @@ def test_progress_is_reported_while_it_runs(simulator_of, tmp_path):
         pytest.param(STUBBORN, 0, 0.6, marks=pytest.mark.programs),
         # Time enough to have one.
         (FAMILY + SLEEP, 7, 3.0),
-        pytest.param("import os, signal; os.kill(os.getpid(), signal.SIGSTOP)", 0, 0.6, marks=pytest.mark.programs),
+        pytest.param(
+            "import os, signal; os.kill(os.getpid(), signal.SIGSTOP)",
+            0,
+            0.6,
+            marks=pytest.mark.programs,
+        ),
     ],
     ids=["hangs", "ignores SIGTERM", "has a family", "is stopped"],
 )
-def test_a_command_that_hangs_is_killed_with_all_that_it_started(simulator_of, code, ends_at, within):
+def test_a_command_that_hangs_is_killed_with_all_that_it_started(
+    simulator_of, code, ends_at, within
+):
     result = simulator_of(code, wall_timeout=within).run(EVERYTHING, 0)
-    assert (result.outcome, result.failure) == ("error", f"took longer than {within:g} s of wall clock")
+    assert (result.outcome, result.failure) == (
+        "error",
+        f"took longer than {within:g} s of wall clock",
+    )
     assert result.end_pose[:3][0] == ends_at
 
 
@@ -129,7 +153,9 @@ def test_what_a_command_leaves_behind_is_killed(simulator_of):
 
 
 def test_a_log_that_ends_long_after_the_timeout_is_an_error(simulator_of):
-    late = simulator_of("print('0,0,0,0.2,0,0,0,1'); print('1e9,3,0,0.2,0,0,0,1'); exit(1)").run(EVERYTHING, 0)
+    late = simulator_of("print('0,0,0,0.2,0,0,0,1'); print('1e9,3,0,0.2,0,0,0,1'); exit(1)").run(
+        EVERYTHING, 0
+    )
     assert late.outcome == "error"
     assert late.failure.startswith("the pose log ends at 1e+09 s, and the timeout is ")
 
@@ -139,17 +165,29 @@ def test_a_log_that_ends_long_after_the_timeout_is_an_error(simulator_of):
     [
         ("exit(3)", "the command's exit code is 3, neither 0 nor 1"),
         ("exit(139)", "exit code is 139, neither 0 nor 1 .SIGSEGV."),
-        ("print('1,0;3,0;0,0;0,2;0;0;0;1')", "write decimal points, and commas between the numbers"),
+        (
+            "print('1,0;3,0;0,0;0,2;0;0;0;1')",
+            "write decimal points, and commas between the numbers",
+        ),
         ("1 / 0", "the command ended with an exception: ZeroDivisionError: division by zero"),
-        ("import sys; print('no display\\n\\x1b[2J', file=sys.stderr); exit(255)", "exit code is 255, .*: .*2J"),
+        (
+            "import sys; print('no display\\n\\x1b[2J', file=sys.stderr); exit(255)",
+            "exit code is 255, .*: .*2J",
+        ),
         (
             "import sys; sys.stderr.write('x' * 100000 + '\\nlast ' + 'y' * 1000); exit(9)",
             "exit code is 9, .*: last y+[.]{3}$",
         ),
         ("import os; os.kill(os.getpid(), 11)", "the command was ended by SIGSEGV"),
         ("import os; os.abort()", "the command was ended by SIGABRT"),
-        ("import os, time; os.kill(os.getppid(), 9); time.sleep(1000)", "the command's supervisor was killed"),
-        ("print('Gazebo 11')", "the pose log, line 1: expected t,x,y,z,qx,qy,qz,qw .* found 'Gazebo 11'"),
+        (
+            "import os, time; os.kill(os.getppid(), 9); time.sleep(1000)",
+            "the command's supervisor was killed",
+        ),
+        (
+            "print('Gazebo 11')",
+            "the pose log, line 1: expected t,x,y,z,qx,qy,qz,qw .* found 'Gazebo 11'",
+        ),
         ("pass", "the pose log has no rows"),
     ],
 )
@@ -168,8 +206,14 @@ def test_what_breaks_is_an_error_with_its_reason(simulator_of, code, complaint):
         ("1 / 0", "error"),
         ("raise ExceptionGroup('two', [ValueError('a'), KeyError('b')])", "error"),
         # An exception that was caught and printed, or an interruption, is not the reason for the exit code.
-        ("import sys; sys.excepthook(*caught()); print('going on', file=sys.stderr); exit(1)", "failed"),
-        ("import sys; sys.excepthook(KeyboardInterrupt, KeyboardInterrupt(), None); exit(1)", "failed"),
+        (
+            "import sys; sys.excepthook(*caught()); print('going on', file=sys.stderr); exit(1)",
+            "failed",
+        ),
+        (
+            "import sys; sys.excepthook(KeyboardInterrupt, KeyboardInterrupt(), None); exit(1)",
+            "failed",
+        ),
         ("import sys; sys.excepthook(*caught()); exit(0)", "pass"),
     ],
 )
@@ -201,7 +245,9 @@ def test_output_without_end_neither_fills_memory_nor_blocks(simulator_of, monkey
             log.write(b"0,1,2,3,0,0,0,1\\n" * 4000)
     """
     for to, words in (("sys.stdout.buffer", ""), ("open(sys.argv[1], 'wb')", "{log}")):
-        result = simulator_of(flood.replace("TO", to).replace("STDERR", "2000"), words).run(EVERYTHING, 0)
+        result = simulator_of(flood.replace("TO", to).replace("STDERR", "2000"), words).run(
+            EVERYTHING, 0
+        )
         assert result.outcome == "error"
         assert "larger than" in result.failure
 
@@ -212,7 +258,9 @@ def test_a_program_that_goes_missing_or_cannot_be_executed_is_an_error(simulator
     program.write_bytes(b"\x7fELF nonsense")
     program.chmod(0o755)
     simulator._words = (str(program),)
-    assert "the command cannot be started: Exec format error" in simulator.run(EVERYTHING, 0).failure
+    assert (
+        "the command cannot be started: Exec format error" in simulator.run(EVERYTHING, 0).failure
+    )
     program.unlink()
     assert "the command cannot be started: No such file" in simulator.run(EVERYTHING, 0).failure
     simulator._scenario = simulator._scenario.model_copy(update={"folder": tmp_path / "gone"})
@@ -243,7 +291,12 @@ ExternalSimulator(load_parts(scenario)[0], scenario).run(frozenset(), 0)
 
 def test_a_worker_that_is_killed_while_it_writes_the_files_leaves_nothing(tmp_path):
     environment = os.environ | {"TMPDIR": tempfile.gettempdir()}
-    done = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path)], env=environment, cwd=ROOT, capture_output=True)
+    done = subprocess.run(
+        [sys.executable, "-c", KILLED, str(tmp_path)],
+        env=environment,
+        cwd=ROOT,
+        capture_output=True,
+    )
     assert done.returncode == -9, done.stderr
 
 
@@ -289,7 +342,9 @@ def test_headers_comments_blanks_and_line_ends_do_not_count(text):
 
 
 def test_a_row_every_tenth_of_a_second_and_the_last_one_are_kept():
-    rows = read("".join(f"{step * 0.001:.3f},{step},0,0,0,0,0,1\n" for step in range(1051)), piece=1000)
+    rows = read(
+        "".join(f"{step * 0.001:.3f},{step},0,0,0,0,0,1\n" for step in range(1051)), piece=1000
+    )
     assert rows[:, 0].tolist() == pytest.approx([*np.arange(0, 1.01, 0.1), 1.05])
     assert rows[-1, 1] == 1050
 
@@ -310,12 +365,18 @@ def test_progress_gets_what_is_kept():
     [
         ("", "no rows; expected t,x,y,z,qx,qy,qz,qw"),
         ("t,x,y,z,qx,qy,qz,qw\n", "no rows"),
-        (f"{ROW}{ROW}1,2,3\n", "line 3: expected t,x,y,z,qx,qy,qz,qw (s, m, a quaternion), found '1,2,3'"),
+        (
+            f"{ROW}{ROW}1,2,3\n",
+            "line 3: expected t,x,y,z,qx,qy,qz,qw (s, m, a quaternion), found '1,2,3'",
+        ),
         (f"{ROW}Gazebo says hello\n", "line 2: expected .* found 'Gazebo says hello'"),
         ("1 2 3 4 0 0 0 1\n", "line 1"),
         (f"1,{ROW}", "line 1"),
         ("1,nan,3,4,0,0,0,1\n", "'; a number is not finite"),
-        ("1,0,0,0,2,5,4,0,0,0,0,0,0,0,1,0\n", "'; write decimal points, and commas between the numbers"),
+        (
+            "1,0,0,0,2,5,4,0,0,0,0,0,0,0,1,0\n",
+            "'; write decimal points, and commas between the numbers",
+        ),
         ("1,2,3,inf,0,0,0,1", "line 1"),
         ("1,2,3,4,0,0,0,0\n", "line 1: the quaternion 0,0,0,0 has no length"),
         (f"{ROW}0.9,2,3,4,0,0,0,1\n", "line 2: time goes back from 1 to 0.9 s"),
@@ -329,7 +390,9 @@ def test_progress_gets_what_is_kept():
     ],
 )
 def test_nonsense_is_reported_with_its_line(text, complaint):
-    with pytest.raises(BadLog, match=complaint.replace("(s,", "[(]s,").replace("on)", "on[)]")) as reported:
+    with pytest.raises(
+        BadLog, match=complaint.replace("(s,", "[(]s,").replace("on)", "on[)]")
+    ) as reported:
         read(text)
     assert str(reported.value).isprintable() and len(str(reported.value)) < 200
 

@@ -32,7 +32,9 @@ def test_turns_to_a_goal_behind():
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_among_barrels_within_its_limits(seed):
-    ground = Ground(circles=tuple((2 + 1.7 * n, (-1) ** (n + seed) * 0.4 * (n % 3), 0.3) for n in range(6)))
+    ground = Ground(
+        circles=tuple((2 + 1.7 * n, (-1) ** (n + seed) * 0.4 * (n % 3), 0.3) for n in range(6))
+    )
     given = setup((14, 0), speed=0.8, acceleration=0.6, turn_rate=0.7)
     drove = drive(given, ground, seed=seed)
     assert is_there(drove, (14, 0))
@@ -44,13 +46,19 @@ def test_among_barrels_within_its_limits(seed):
 
 
 @pytest.mark.parametrize(
-    "start", [(0, 0, 0), (0, 1.5, 0), (0, -3, 0), (2.5, 2, -1)], ids=["ahead", "beside", "far beside", "near"]
+    "start",
+    [(0, 0, 0), (0, 1.5, 0), (0, -3, 0), (2.5, 2, -1)],
+    ids=["ahead", "beside", "far beside", "near"],
 )
 def test_straight_through_a_gap(start):
     drove = drive(setup((8, 0)), GAP, start=start)
     assert is_there(drove, (8, 0))
     assert drove.times[-1] < 14
-    inside = [(pose, twist) for pose, twist in zip(drove.poses, drove.twists, strict=True) if abs(pose[0] - 4) < 0.5]
+    inside = [
+        (pose, twist)
+        for pose, twist in zip(drove.poses, drove.twists, strict=True)
+        if abs(pose[0] - 4) < 0.5
+    ]
     assert max(abs(pose[1]) for pose, _ in inside) < 0.1
     assert max(abs(pose[2]) for pose, _ in inside) < 0.15
     assert min(twist.speed for _, twist in inside) > 0.3
@@ -99,7 +107,9 @@ def test_gives_up_at_once_where_it_may_not_try():
 def test_goes_on_after_slipping():
     drove = drive(setup((8, 0)), Ground(), slips=lambda time: 3 < time < 13)
     assert is_there(drove, (8, 0))
-    slipping = [twist for time, twist in zip(drove.times, drove.twists, strict=True) if 3 < time < 13]
+    slipping = [
+        twist for time, twist in zip(drove.times, drove.twists, strict=True) if 3 < time < 13
+    ]
     assert any(twist.speed < 0 for twist in slipping), "it tries to get free backwards"
 
 

@@ -34,7 +34,9 @@ def best_lengths(factors: np.ndarray, start: int) -> np.ndarray:
 
 
 @given(
-    factors=st.lists(st.sampled_from([1.0, 1.3, 4.0, np.inf]), min_size=4 * COUNT**2, max_size=4 * COUNT**2),
+    factors=st.lists(
+        st.sampled_from([1.0, 1.3, 4.0, np.inf]), min_size=4 * COUNT**2, max_size=4 * COUNT**2
+    ),
     start=st.integers(0, COUNT**2 - 1),
 )
 def test_no_way_is_shorter(factors, start):

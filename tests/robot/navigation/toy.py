@@ -53,7 +53,9 @@ class Ground:
         px, py, radius = self._posts
         cosine, sine = math.cos(heading), math.sin(heading)
         along, across = cosine * (px - x) + sine * (py - y), cosine * (py - y) - sine * (px - x)
-        beyond = np.stack([np.maximum(along - ahead, -behind - along), np.maximum(across - left, -right - across)])
+        beyond = np.stack(
+            [np.maximum(along - ahead, -behind - along), np.maximum(across - left, -right - across)]
+        )
         apart = np.hypot(*np.maximum(beyond, 0.0)) + np.minimum(beyond.max(axis=0), 0.0) - radius
         return float(apart.min(initial=math.inf))
 
@@ -124,7 +126,9 @@ def drive(
             ranges = here.ranges(*eye, heading) + NOISE * random.standard_normal(len(ANGLES))
             scan = Scan(time, ANGLES, ranges, LIDAR)
         estimate = Estimate(x, y, heading, twist.speed, twist.turn_rate)
-        twist = drove.navigator.step(Reading(time, estimate, imu=Imu(twist.turn_rate, 0.0, 0.0), scan=scan))
+        twist = drove.navigator.step(
+            Reading(time, estimate, imu=Imu(twist.turn_rate, 0.0, 0.0), scan=scan)
+        )
         drove.times.append(time)
         drove.poses.append((x, y, heading))
         drove.twists.append(twist)
@@ -132,6 +136,9 @@ def drive(
             break
         if not slips(time):
             heading = wrap(heading + PERIOD / 2 * twist.turn_rate)
-            x, y = x + PERIOD * twist.speed * math.cos(heading), y + PERIOD * twist.speed * math.sin(heading)
+            x, y = (
+                x + PERIOD * twist.speed * math.cos(heading),
+                y + PERIOD * twist.speed * math.sin(heading),
+            )
             heading = wrap(heading + PERIOD / 2 * twist.turn_rate)
     return drove

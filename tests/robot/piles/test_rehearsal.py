@@ -19,14 +19,20 @@ from tests.tiers import slow
 @pytest.mark.parametrize("memory", slow(pytest.mark.examples, [0.0, 3e5], but=[3e5]))
 def test_a_small_memory_changes_no_bit(world_of, add, husky, scenario_of, monkeypatch, memory):
     world = add(
-        world_of(), cube("a", 1.2, 0.0, 0.15), cube("b", 1, 3, 0.5), cube("c", 1.1, 3.1, 0.9), cube("d", 5, -9, 0.3)
+        world_of(),
+        cube("a", 1.2, 0.0, 0.15),
+        cube("b", 1, 3, 0.5),
+        cube("c", 1.1, 3.1, 0.9),
+        cube("d", 5, -9, 0.3),
     )
     parts = ["abcd", "bc", "abd", "cd", "abcd"]
     large = Template(world, husky, scenario_of(**SECTIONS))
     expected = [bits(run(large, *part)) for part in parts]
     rehearsed = []
     simulate = Rehearsals._rows
-    monkeypatch.setattr(Rehearsals, "_rows", lambda self, *pile: rehearsed.append(pile) or simulate(self, *pile))
+    monkeypatch.setattr(
+        Rehearsals, "_rows", lambda self, *pile: rehearsed.append(pile) or simulate(self, *pile)
+    )
     monkeypatch.setattr(rehearsal, "MEMORY", memory)
     small = Template(world, husky, scenario_of(**SECTIONS))
     assert [bits(run(small, *part)) for part in parts] == expected
@@ -38,7 +44,12 @@ TABLE = box_model("table", "6 3 0.2 0 0 0", "1 1 0.4")
 
 
 def test_what_falls_and_what_rests_is_told_apart(world_of, add, simulator):
-    world = add(world_of(TABLE), cube("rests", 6, 3, 0.55), cube("falls", 3, 3, 1.15), cube("lost", 300, 0, 0.15))
+    world = add(
+        world_of(TABLE),
+        cube("rests", 6, 3, 0.55),
+        cube("falls", 3, 3, 1.15),
+        cube("lost", 300, 0, 0.15),
+    )
     settled = simulator(world).settled()
     ways = moved(world, settled)
     assert ways["rests"] < 0.005
@@ -62,7 +73,9 @@ def test_it_is_the_same_whatever_ran_before_and_changes_no_run(world_of, add, si
     assert (again.trajectory == before.trajectory).all()
 
 
-def test_a_pile_that_breaks_is_named_and_the_robot_still_runs(world_of, add, simulator, monkeypatch):
+def test_a_pile_that_breaks_is_named_and_the_robot_still_runs(
+    world_of, add, simulator, monkeypatch
+):
     def breaks(*_):
         raise ValueError("not finite")
 
@@ -78,9 +91,12 @@ def test_a_pile_that_breaks_is_named_and_the_robot_still_runs(world_of, add, sim
 
 def test_a_pile_that_never_rests_is_named(world_of, add, simulator):
     wheel = model_of("wheel", link_of("link", Box((0.3, 0.3, 0.3)), Pose((4, 3, 3.0))))
-    ways = Settled(seconds=2.0, places={"wheel": (Pose((4, 3, 2.0)),)}, restless=("wheel",), fallen=("lost",))
+    ways = Settled(
+        seconds=2.0, places={"wheel": (Pose((4, 3, 2.0)),)}, restless=("wheel",), fallen=("lost",)
+    )
     assert (
-        dict(notes_on(add(world_of(), wheel), ways))["restless"] == "1 model does not come to rest within 2.0 s (wheel)"
+        dict(notes_on(add(world_of(), wheel), ways))["restless"]
+        == "1 model does not come to rest within 2.0 s (wheel)"
     )
     # Falls for longer than a pile is simulated.
     world: World = add(world_of(), cube("high", 4, 3, 3000.0))
@@ -88,7 +104,10 @@ def test_a_pile_that_never_rests_is_named(world_of, add, simulator):
 
 
 def test_without_ground_it_is_told_what_falls_out_of_the_world(world_of, add, simulator):
-    world = add(world_of(box_model("floor", "0 0 -0.5 0 0 0", "20 20 1"), ground=False), cube("lost", 30, 0, 0.15))
+    world = add(
+        world_of(box_model("floor", "0 0 -0.5 0 0 0", "20 20 1"), ground=False),
+        cube("lost", 30, 0, 0.15),
+    )
     settled = simulator(world).settled()
     assert settled.fallen == ("lost",)
     assert dict(notes_on(world, settled)) == {"fallen": "1 model falls out of the world (lost)"}
@@ -114,7 +133,9 @@ def simulator(husky, scenario_of):
 
 
 def pairs(simulator: Variants, world: World, *protected: str) -> list[tuple[str, str]]:
-    return simulator(world, protected=protected).supports(frozenset(world.elements(frozenset(protected))))
+    return simulator(world, protected=protected).supports(
+        frozenset(world.elements(frozenset(protected)))
+    )
 
 
 def test_each_model_rests_on_what_carries_it_after_it_has_fallen(simulator, world_of, add):
@@ -132,30 +153,46 @@ def test_each_model_rests_on_what_carries_it_after_it_has_fallen(simulator, worl
         cube("right", 4.0, 4.0, 0.15),
         plank("plank", 4.0, 3.5, 0.33, 1.3),
     )
-    expected = [("cup", "shelf"), ("lid", "cup"), ("over", "under"), ("plank", "left"), ("plank", "right")]
+    expected = [
+        ("cup", "shelf"),
+        ("lid", "cup"),
+        ("over", "under"),
+        ("plank", "left"),
+        ("plank", "right"),
+    ]
     assert pairs(simulator, world) == expected
     # What always stays is skipped: what lies on it rests on what carries it.
     assert pairs(simulator, world, "cup")[0] == ("lid", "shelf")
 
 
 def test_what_stands_beside_something_does_not_rest_on_it(simulator, world_of, add):
-    world = add(world_of(box_model("wall", "1 3.35 0.5 0 0 0", "1 0.4 1")), ball("ball", 1.0, 2.95, 0.2))
+    world = add(
+        world_of(box_model("wall", "1 3.35 0.5 0 0 0", "1 0.4 1")), ball("ball", 1.0, 2.95, 0.2)
+    )
     assert pairs(simulator, world) == []
 
 
 @pytest.mark.rates
 def test_what_rolls_onto_another_pile_rests_on_it(simulator, world_of, add):
-    ramp = model_of("ramp", link_of("link", wedge(1.0, 1.0, 0.3), Pose((2.0, 6.0, 0.45)), mass=None))
+    ramp = model_of(
+        "ramp", link_of("link", wedge(1.0, 1.0, 0.3), Pose((2.0, 6.0, 0.45)), mass=None)
+    )
     tray = [cube(f"tray_{side}", 0.6, 6.0 + side, 0.15) for side in (-1, 1)]
-    bottom = model_of("bottom", link_of("link", Box((1.2, 2.5, 0.05)), Pose((0.75, 6.0, 0.33)), mass=20.0))
+    bottom = model_of(
+        "bottom", link_of("link", Box((1.2, 2.5, 0.05)), Pose((0.75, 6.0, 0.33)), mass=20.0)
+    )
     stop = model_of("stop", link_of("link", Box((0.1, 2.5, 1.0)), Pose((0.2, 6.0, 0.9)), mass=None))
     world = add(world_of(), ball("ball", 2.3, 6.0, 0.85), ramp, *tray, bottom, stop)
     assert ("ball", "bottom") in pairs(simulator, world)
 
 
-def test_a_pile_that_cannot_be_simulated_is_taken_as_it_starts(simulator, world_of, add, monkeypatch):
+def test_a_pile_that_cannot_be_simulated_is_taken_as_it_starts(
+    simulator, world_of, add, monkeypatch
+):
     def broken(*_: object) -> None:
         raise RuntimeError("it broke")
 
     monkeypatch.setattr(rehearsal.Simulator, "AdvanceTo", broken)
-    assert pairs(simulator, add(world_of(SHELF), cube("cup", 1.0, 3.0, 0.9499))) == [("cup", "shelf")]
+    assert pairs(simulator, add(world_of(SHELF), cube("cup", 1.0, 3.0, 0.9499))) == [
+        ("cup", "shelf")
+    ]

@@ -14,7 +14,17 @@ from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
 from ddenv.world.whole import FALL
-from tests.robot.conftest import bits, box_model, cube, door, joint_of, link_of, model_of, run, wedge
+from tests.robot.conftest import (
+    bits,
+    box_model,
+    cube,
+    door,
+    joint_of,
+    link_of,
+    model_of,
+    run,
+    wedge,
+)
 from tests.tiers import slow
 
 BOARD = "0.9 0.09 0.04"
@@ -25,7 +35,14 @@ def flap(name: str, x: float, y: float, lower: float = -0.3, damping: float = 0.
     """A plate on a horizontal hinge, pulled down by its weight to its limit."""
     plate = link_of("plate", Box((0.4, 0.3, 0.02)), Pose((x + 0.25, y, 1.0)))
     hinge = joint_of(
-        "revolute", "world", "plate", (x, y, 1.0), (0.0, -1.0, 0.0), lower=lower, upper=1.0, damping=damping
+        "revolute",
+        "world",
+        "plate",
+        (x, y, 1.0),
+        (0.0, -1.0, 0.0),
+        lower=lower,
+        upper=1.0,
+        damping=damping,
     )
     return model_of(name, plate, joints=(hinge,))
 
@@ -50,7 +67,10 @@ def slope(name: str, x: float, y: float) -> Model:
 FAR = {
     "at rest": (cube("far", 2.0, 6.0, 0.15),),
     "in the air": (cube("far", 2.0, 6.0, 1.5),),
-    "rolling": (model_of("far", link_of("link", Sphere(0.2), Pose((2.2, 6.0, 0.5)))), slope("hill", 2.0, 6.0)),
+    "rolling": (
+        model_of("far", link_of("link", Sphere(0.2), Pose((2.2, 6.0, 0.5)))),
+        slope("hill", 2.0, 6.0),
+    ),
     "swinging": (flap("far", 2.0, 6.0, lower=-np.inf, damping=0.0),),
     "at its limit": (flap("far", 2.0, 6.0),),
     "in two parts": (
@@ -99,14 +119,19 @@ def test_a_model_that_takes_no_part_leaves_no_trace_when_it_is_removed(template,
 @pytest.mark.rates
 def test_what_moves_far_away_does_not_decide_whether_the_robot_wakes_what_it_passes(template):
     """What touches itself has no twin, and wakes before the robot can touch it."""
-    links = (link_of(name, Box((0.3, 0.3, 0.3)), Pose((1.2, 0.55, z))) for name, z in (("a", 0.15), ("b", 0.46)))
+    links = (
+        link_of(name, Box((0.3, 0.3, 0.3)), Pose((1.2, 0.55, z)))
+        for name, z in (("a", 0.15), ("b", 0.46))
+    )
     near = replace(model_of("near", *links), self_collide=True)
     both = template(near, *FAR["swinging"], failure={"timeout": 3.0})
     assert bits(run(both, "near", "far"), "far") == bits(run(both, "near"))
 
 
 def test_what_fell_to_rest_does_not_creep_at_all(template):
-    pile = template(cube("low", 1.0, 3.0, 0.2), cube("high", 1.0, 3.1, 0.6), failure={"timeout": 10.0})
+    pile = template(
+        cube("low", 1.0, 3.0, 0.2), cube("high", 1.0, 3.1, 0.6), failure={"timeout": 10.0}
+    )
     motions = run(pile, "low", "high").motions
     for name, height in (("low", 0.15), ("high", 0.45)):
         rows = motions[name][20:, 1:]
@@ -140,7 +165,9 @@ def test_the_robot_pushes_what_was_asleep_as_if_it_had_been_awake(template):
 @pytest.mark.rates
 def test_models_of_many_and_of_few_shapes_rest_on_each_other_and_are_pushed(template):
     # At rest the cube lies a little within the tile. Drake must not look for contacts of one twin with another.
-    pile = template(tile("tile", 2.0, 0.0), cube("cube", 2.0, 0.0, 0.349), tile("beside", 2.0, 0.905))
+    pile = template(
+        tile("tile", 2.0, 0.0), cube("cube", 2.0, 0.0, 0.349), tile("beside", 2.0, 0.905)
+    )
     slept = run(pile, "tile", "cube", "beside")
     pile._sleeping = False
     awake = run(pile, "tile", "cube", "beside")
@@ -161,10 +188,16 @@ def test_a_pile_wakes_as_one(template):
 @pytest.mark.rates
 def test_what_the_robot_sets_in_motion_wakes_what_it_comes_near(template):
     row = [
-        model_of(f"domino_{number}", link_of("link", Box((0.1, 0.5, 0.9)), Pose((1.5 + 0.5 * number, 0.0, 0.45)), 2.0))
+        model_of(
+            f"domino_{number}",
+            link_of("link", Box((0.1, 0.5, 0.9)), Pose((1.5 + 0.5 * number, 0.0, 0.45)), 2.0),
+        )
         for number in range(7)
     ]
-    result = run(template(*row, controller={"speed": 0.4}, failure={"timeout": 8.0}), *(model.name for model in row))
+    result = run(
+        template(*row, controller={"speed": 0.4}, failure={"timeout": 8.0}),
+        *(model.name for model in row),
+    )
     last = result.motions["domino_6"]
     fallen = int((last[:, 3] < 0.4).argmax())
     # The last one falls when the robot, which reaches 0.5 m ahead of its frame, is still far away from it.
@@ -191,7 +224,9 @@ def test_what_is_asleep_or_removed_stands_on_its_joint_like_a_pencil_on_its_tip(
     ball = joint_of("ball", "pole", "head", (1.0, 3.0, 1.8))
     head = link_of("head", Box((0.1, 0.1, 0.2)), Pose((1.1, 3.0, 2.0)))
     pencil = template(
-        model_of("pencil", pole, head, joints=(hinge, ball)), failure={"timeout": 12.0}, goal={"x": 90, "y": 0}
+        model_of("pencil", pole, head, joints=(hinge, ball)),
+        failure={"timeout": 12.0},
+        goal={"x": 90, "y": 0},
     )
     assert run(pencil).outcome == "failed"
     entries = pencil.context.hold.entries(pencil.context.built.moving.values())
@@ -208,7 +243,9 @@ def test_a_door_at_rest_opens_when_the_robot_runs_into_it(template):
     assert run(locked, "door").trajectory[:, 1].max() < 1.7
 
 
-def test_a_carrier_that_is_removed_lets_fall_what_slept_on_it(template, world_of, add, husky, scenario_of):
+def test_a_carrier_that_is_removed_lets_fall_what_slept_on_it(
+    template, world_of, add, husky, scenario_of
+):
     table = box_model("table", "1 3 0.4 0 0 0", "1 1 0.8")
     world = add(world_of(table), cube("cup", 1.0, 3.0, 0.95))
     template = Template(world, husky, scenario_of(**SECTIONS))
@@ -219,7 +256,9 @@ def test_a_carrier_that_is_removed_lets_fall_what_slept_on_it(template, world_of
 
 def test_what_falls_out_of_the_world_is_left_alone(add, world_of, husky, scenario_of):
     table = box_model("table", "0 0 -0.5 0 0 0", "30 5 1")
-    world = add(world_of(table, ground=False), cube("lost", 0.0, 4.0, 0.5), cube("pushed", 1.2, 2.45, 0.15))
+    world = add(
+        world_of(table, ground=False), cube("lost", 0.0, 4.0, 0.5), cube("pushed", 1.2, 2.45, 0.15)
+    )
     template = Template(world, husky, scenario_of(**SECTIONS))
     rows = run(template, "table", "lost", "pushed").motions["lost"]
     assert -1.0 - FALL - 5.0 < rows[-1, 3] < -1.0 - FALL

@@ -27,7 +27,11 @@ def loose(name: str, shape: Shape, pose: Pose) -> Model:
 
 
 def obstacles_of(*models: Model) -> Obstacles:
-    return Obstacles.of(World(path=Path("world.sdf"), name="world", text=b"", gravity=(0.0, 0.0, -9.81), models=models))
+    return Obstacles.of(
+        World(
+            path=Path("world.sdf"), name="world", text=b"", gravity=(0.0, 0.0, -9.81), models=models
+        )
+    )
 
 
 def plain(**settings: float) -> scenario.Lidar:
@@ -36,12 +40,17 @@ def plain(**settings: float) -> scenario.Lidar:
 
 
 def lidar_of(
-    *models: Model, settings: scenario.Lidar | None = None, present: Iterable[str] | None = None, seed: int = 0
+    *models: Model,
+    settings: scenario.Lidar | None = None,
+    present: Iterable[str] | None = None,
+    seed: int = 0,
 ) -> Lidar:
     """A lidar in the world of `models`, of which all or only those `present` are there."""
     names = frozenset(model.name for model in models) if present is None else frozenset(present)
     moving = [model for model in models if not model.static and model.name in names]
-    return Lidar(settings or plain(), obstacles_of(*models), names, moving, np.random.default_rng(seed))
+    return Lidar(
+        settings or plain(), obstacles_of(*models), names, moving, np.random.default_rng(seed)
+    )
 
 
 def scan(lidar: Lidar, robot: Pose | None = None, *links: Pose, now: float = 0.0) -> Scan:

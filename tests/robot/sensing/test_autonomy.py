@@ -51,7 +51,11 @@ def test_each_sensor_measures_at_its_rate(world_of, husky, scenario_of):
     heard, _ = listen(world_of(), husky, scenario)
     assert [round(reading.time / 0.05) for reading in heard.readings] == list(range(40))
     seen = {
-        name: [number for number, reading in enumerate(heard.readings) if getattr(reading, name) is not None]
+        name: [
+            number
+            for number, reading in enumerate(heard.readings)
+            if getattr(reading, name) is not None
+        ]
         for name in ("compass", "imu", "wheels", "scan")
     }
     every = {"compass": 4, "imu": 1, "wheels": 2, "scan": 5}
@@ -78,14 +82,18 @@ def test_the_estimate_is_near_the_truth_and_never_the_truth(world_of, husky, sce
     assert max(gaps) < 0.3
     assert min(gaps[5:]) > 0.0
     # Skidding wheels, seen by the odometry alone, would have it turn at twice the rate.
-    assert pairs[-1][0].heading == pytest.approx(2 * math.atan2(pairs[-1][1][7], pairs[-1][1][4]), abs=0.1)
+    assert pairs[-1][0].heading == pytest.approx(
+        2 * math.atan2(pairs[-1][1][7], pairs[-1][1][4]), abs=0.1
+    )
 
 
 @pytest.mark.rates
 def test_a_compass_that_points_wrong_leads_the_robot_astray(world_of, husky, scenario_of):
     sections = {"goal": {"x": 8, "y": 0, "tolerance": 0.6}, "failure": {"timeout": 20.0}}
     good = Template(world_of(), husky, scenario_of(sensors=NOISE, **sections))
-    wrong = Template(world_of(), husky, scenario_of(sensors=NOISE | {"compass_bias": 0.5}, **sections))
+    wrong = Template(
+        world_of(), husky, scenario_of(sensors=NOISE | {"compass_bias": 0.5}, **sections)
+    )
     assert {good.run(frozenset(), seed).outcome for seed in range(4)} == {"pass"}
     results = [wrong.run(frozenset(), seed) for seed in range(4)]
     assert "lost" in {result.failure for result in results}
@@ -111,7 +119,9 @@ def test_wheels_that_slip_are_believed(world_of, husky, scenario_of):
 
 
 def test_the_setup_describes_the_robot(world_of, husky, scenario_of):
-    scenario = scenario_of(controller={"speed": 0.7, "options": {"side": "left"}}, failure={"timeout": 0.2})
+    scenario = scenario_of(
+        controller={"speed": 0.7, "options": {"side": "left"}}, failure={"timeout": 0.2}
+    )
     heard, _ = listen(world_of(), husky, scenario, seed=9)
     setup = heard.setup
     assert (setup.goal, setup.tolerance, setup.start) == ((3.0, 0.0), 0.5, (0.0, 0.0, 0.0))
@@ -123,14 +133,26 @@ def test_the_setup_describes_the_robot(world_of, husky, scenario_of):
 def test_a_clock_counts_whole_steps(scenario_of):
     sensors = {"compass_rate": 7, "lidar": {"rate": 3}}
     scenario = scenario_of(
-        sensors=sensors, failure={"timeout": 3.0}, simulation={"time_step": 0.01}, controller={"period": 0.03}
+        sensors=sensors,
+        failure={"timeout": 3.0},
+        simulation={"time_step": 0.01},
+        controller={"period": 0.03},
     )
     ticks = Clock.of(scenario).ticks
     steps = [tick.step for tick in ticks]
     assert steps == sorted(set(steps))
     assert (steps[0], steps[-1]) == (0, 300)
-    for name, every in (("record", 10), ("command", 3), ("compass", 14), ("imu", 5), ("odometry", 5), ("lidar", 33)):
-        assert [tick.step for tick in ticks if getattr(tick, name)] == list(range(0, 301, every)), name
+    for name, every in (
+        ("record", 10),
+        ("command", 3),
+        ("compass", 14),
+        ("imu", 5),
+        ("odometry", 5),
+        ("lidar", 33),
+    ):
+        assert [tick.step for tick in ticks if getattr(tick, name)] == list(range(0, 301, every)), (
+            name
+        )
     assert np.allclose([tick.time for tick in ticks], np.array(steps) * 0.01)
 
 
@@ -206,7 +228,9 @@ class Matrices:
 
 
 @given(
-    st.lists(st.tuples(*[st.floats(-1, 1)] * 4, st.none() | st.floats(-3, 3)), min_size=1, max_size=40),
+    st.lists(
+        st.tuples(*[st.floats(-1, 1)] * 4, st.none() | st.floats(-3, 3)), min_size=1, max_size=40
+    ),
     st.floats(0, 0.2),
     st.floats(0.001, 0.2),
 )
@@ -250,7 +274,15 @@ def readings(noise: Sensors, seed: int, count: int) -> np.ndarray:
     rows = []
     for _ in range(count):
         imu = sensors.imu(TRUTH)
-        rows.append((sensors.compass(TRUTH), imu.yaw_rate, imu.roll, imu.pitch, *sensors.odometry(TRUTH.wheels)))
+        rows.append(
+            (
+                sensors.compass(TRUTH),
+                imu.yaw_rate,
+                imu.roll,
+                imu.pitch,
+                *sensors.odometry(TRUTH.wheels),
+            )
+        )
     return np.array(rows)
 
 
@@ -262,7 +294,14 @@ def test_noise_has_the_spread_that_the_scenario_says():
 
 def test_a_bias_is_drawn_once_in_a_run():
     noise = Sensors(
-        compass=0, compass_bias=0.1, gyro=0, gyro_bias=0.2, odometry=0, odometry_bias=0.05, tilt=0, imu_rate=20
+        compass=0,
+        compass_bias=0.1,
+        gyro=0,
+        gyro_bias=0.2,
+        odometry=0,
+        odometry_bias=0.05,
+        tilt=0,
+        imu_rate=20,
     )
     first = []
     for seed in range(300):

@@ -12,7 +12,18 @@ from scipy.spatial import ConvexHull
 
 from ddenv.world import scenario
 from ddenv.world.files.meshes import convex_hull
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere, Terrain
+from ddenv.world.model import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    Mesh,
+    Model,
+    Plane,
+    Shape,
+    Sphere,
+    Terrain,
+)
 from ddenv.world.pose import Pose
 from tests.robot.sensing.conftest import lidar_of, loose, scan, still
 from tests.tiers import examples
@@ -45,7 +56,9 @@ shapes = st.one_of(
 turned = st.builds(Pose.from_rpy, of(-8, 8), of(-8, 8), of(-1, 1), angle, angle, angle)
 # Much in the real world is parallel or at right angles to all else.
 upright = st.builds(
-    Pose.from_rpy, *[st.sampled_from([-3.0, 0.0, 0.5, 2.0])] * 3, *[st.sampled_from([0.0, math.pi / 2, math.pi])] * 3
+    Pose.from_rpy,
+    *[st.sampled_from([-3.0, 0.0, 0.5, 2.0])] * 3,
+    *[st.sampled_from([0.0, math.pi / 2, math.pi])] * 3,
 )
 poses = turned | upright
 lidars = st.builds(
@@ -61,12 +74,20 @@ lidars = st.builds(
 )
 
 
-def slowly(lidar: scenario.Lidar, robot: Pose, placed: list[tuple[Shape, Pose]]) -> tuple[np.ndarray, np.ndarray]:
+def slowly(
+    lidar: scenario.Lidar, robot: Pose, placed: list[tuple[Shape, Pose]]
+) -> tuple[np.ndarray, np.ndarray]:
     """The ranges (N,) m and which of them (N,) are clear."""
     sensor = robot @ Pose((lidar.x, lidar.y, lidar.z))
     angles = np.linspace(-lidar.angle / 2, lidar.angle / 2, lidar.beams)
-    ways = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))]) @ sensor.rotation().T
-    found = [first_met(shape, pose, np.array(sensor.position), ways, lidar.range) for shape, pose in placed]
+    ways = (
+        np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))])
+        @ sensor.rotation().T
+    )
+    found = [
+        first_met(shape, pose, np.array(sensor.position), ways, lidar.range)
+        for shape, pose in placed
+    ]
     ranges = np.min([ranges for ranges, _ in found], axis=0)
     needed = [CLEAR_OF_PLANES if isinstance(shape, Plane) else CLEAR for shape, _ in placed]
     clear = np.all([clear > least for (_, clear), least in zip(found, needed, strict=True)], axis=0)
@@ -90,14 +111,25 @@ def test_what_moves_is_met_where_it_is_now(lidar, robot, around):
     models = [loose(f"m{number}", shape, first) for number, (shape, first, _) in enumerate(around)]
     now = [robot @ pose for _, _, pose in around]
     ranges = scan(lidar_of(*models, settings=lidar), robot, *now).ranges
-    agree(ranges, *slowly(lidar, robot, [(shape, pose) for (shape, _, _), pose in zip(around, now, strict=True)]))
+    agree(
+        ranges,
+        *slowly(
+            lidar, robot, [(shape, pose) for (shape, _, _), pose in zip(around, now, strict=True)]
+        ),
+    )
 
 
-@given(lidars, turned, st.lists(st.tuples(shapes, poses), min_size=2, max_size=5), st.integers(1, 4))
+@given(
+    lidars, turned, st.lists(st.tuples(shapes, poses), min_size=2, max_size=5), st.integers(1, 4)
+)
 def test_what_is_absent_or_never_met_changes_no_bit(lidar, robot, around, count):
-    models = [still(f"m{number}", shape, robot @ pose) for number, (shape, pose) in enumerate(around)]
+    models = [
+        still(f"m{number}", shape, robot @ pose) for number, (shape, pose) in enumerate(around)
+    ]
 
-    def measured(*models: Model, present: list[str] | None = None) -> tuple[bytes, dict[str, float]]:
+    def measured(
+        *models: Model, present: list[str] | None = None
+    ) -> tuple[bytes, dict[str, float]]:
         sensor = lidar_of(*models, settings=lidar, present=present)
         return scan(sensor, robot).ranges.tobytes(), sensor.first_seen
 
@@ -118,9 +150,16 @@ def test_each_range_has_the_same_bits_among_many_shapes_as_alone():
         mesh(4, 20),
     ]
     rows = np.column_stack(
-        [random.uniform(-6, 6, (60, 2)), random.uniform(-0.3, 0.3, 60), random.uniform(-3, 3, (60, 3))]
+        [
+            random.uniform(-6, 6, (60, 2)),
+            random.uniform(-0.3, 0.3, 60),
+            random.uniform(-3, 3, (60, 3)),
+        ]
     )
-    models = [still(f"m{number}", kinds[number % 6], Pose.from_rpy(*row)) for number, row in enumerate(rows)]
+    models = [
+        still(f"m{number}", kinds[number % 6], Pose.from_rpy(*row))
+        for number, row in enumerate(rows)
+    ]
     robot = Pose.from_rpy(0.1, -0.2, 0.05, 0.02, -0.03, 0.5)
     together = scan(lidar_of(*models), robot).ranges
     alone = [scan(lidar_of(*models, present={model.name}), robot).ranges for model in models]
@@ -179,7 +218,9 @@ def first_met(
         in_it = at(middle) <= 0
         low, high = np.where(in_it, low, middle), np.where(in_it, middle, high)
     begins = at(np.zeros(len(ways)))
-    return np.where((depth <= 0) & (begins > 0), high, np.inf), np.minimum(np.abs(depth), np.abs(begins))
+    return np.where((depth <= 0) & (begins > 0), high, np.inf), np.minimum(
+        np.abs(depth), np.abs(begins)
+    )
 
 
 def test_beams_end_on_the_slope_of_terrain_and_pass_over_what_is_lower():

@@ -44,7 +44,9 @@ def test_a_scan_has_its_time_and_the_beams_of_the_settings():
     np.testing.assert_allclose(taken.angles, [-1.0, -0.5, 0.0, 0.5, 1.0])
 
 
-@pytest.mark.parametrize(("x", "seen"), [(20.4, True), (20.6, False), (0.6, True), (0.54, False), (0.2, False)])
+@pytest.mark.parametrize(
+    ("x", "seen"), [(20.4, True), (20.6, False), (0.6, True), (0.54, False), (0.2, False)]
+)
 def test_only_what_is_neither_too_far_nor_too_near_is_measured(x, seen):
     lidar = lidar_of(ball("ball", x), settings=plain(angle=0.01))
     assert ahead(lidar) == (pytest.approx(x - 0.5) if seen else math.inf)
@@ -52,7 +54,11 @@ def test_only_what_is_neither_too_far_nor_too_near_is_measured(x, seen):
 
 
 def test_noise_takes_out_of_range_and_brings_nothing_into_it():
-    taken = scan(lidar_of(still("wall", Box((0.2, 40.0, 2.0)), Pose((19.1, 0.0, 0.0))), settings=plain(noise=1.0)))
+    taken = scan(
+        lidar_of(
+            still("wall", Box((0.2, 40.0, 2.0)), Pose((19.1, 0.0, 0.0))), settings=plain(noise=1.0)
+        )
+    )
     within = np.abs(taken.angles) <= math.acos(19.0 / 20.0)
     measured = taken.ranges[within][np.isfinite(taken.ranges[within])]
     assert 0 < len(measured) < within.sum()
@@ -110,7 +116,11 @@ def test_a_scan_can_be_copied_and_stored():
 
 def test_links_are_where_their_poses_say_in_the_order_of_the_models():
     # The shape is not in its link's origin, and the first link has none.
-    two = model_of("two", link_of("empty", None, Pose()), link_of("arm", Box((0.2, 0.2, 0.2)), Pose((9.0, 9.0, 0.0))))
+    two = model_of(
+        "two",
+        link_of("empty", None, Pose()),
+        link_of("arm", Box((0.2, 0.2, 0.2)), Pose((9.0, 9.0, 0.0))),
+    )
     one = loose("one", Cylinder(0.5, 1.0), Pose((-8.0, 0.0, 0.0)))
     poses = Pose(), Pose((2.1, 0.0, 0.0)), Pose((5.0, 0.0, 0.0))
     lidar = lidar_of(two, WALL, one)
@@ -119,13 +129,18 @@ def test_links_are_where_their_poses_say_in_the_order_of_the_models():
     assert ahead(lidar, Pose(), Pose(), away, Pose((2.0, 0.0, 0.0))) == pytest.approx(1.5)
     assert ahead(lidar, Pose(), Pose(), away, Pose((5.0, 0.0, 0.0))) == pytest.approx(3.0)
     # Without the first model the second one's links come first.
-    assert ahead(lidar_of(two, WALL, one, present={"one"}), Pose(), Pose((2.0, 0.0, 0.0))) == pytest.approx(1.5)
+    assert ahead(
+        lidar_of(two, WALL, one, present={"one"}), Pose(), Pose((2.0, 0.0, 0.0))
+    ) == pytest.approx(1.5)
 
 
 def test_a_link_that_is_fixed_in_the_world_stays():
     post = link_of("post", Box((0.2, 0.2, 1.0)), Pose((2.1, 0.0, 0.0)))
     gate = link_of("gate", Box((0.2, 0.2, 1.0)), Pose((4.1, 0.0, 0.0)))
-    joints = joint_of("fixed", "world", "post", (0.0, 0.0, 0.0)), joint_of("revolute", "post", "gate", (2.0, 0.0, 0.0))
+    joints = (
+        joint_of("fixed", "world", "post", (0.0, 0.0, 0.0)),
+        joint_of("revolute", "post", "gate", (2.0, 0.0, 0.0)),
+    )
     lidar = lidar_of(model_of("barrier", post, gate, joints=joints))
     nowhere = Pose((50.0, 0.0, 0.0))
     assert ahead(lidar, Pose(), nowhere, nowhere) == pytest.approx(2.0)

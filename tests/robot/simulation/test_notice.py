@@ -41,7 +41,10 @@ def test_a_wall_is_touched_when_the_robot_is_there(world_of, husky, scenario_of)
 
 
 def test_what_is_touched_at_the_start_and_at_the_end_counts(world_of, husky, scenario_of):
-    low = {"robot": {"model": "husky.sdf", "spawn": {"x": 0, "y": 0, "z": 0.13}}, "failure": {"timeout": 4.0}}
+    low = {
+        "robot": {"model": "husky.sdf", "spawn": {"x": 0, "y": 0, "z": 0.13}},
+        "failure": {"timeout": 4.0},
+    }
     template = Template(world_of(WALL), husky, scenario_of(**low))
     whole = run(template, "wall")
     assert whole.first_touched["ground"] == 0.0
@@ -61,20 +64,34 @@ def test_what_is_within_range_is_sensed_before_it_is_touched(world_of, husky, sc
     assert x_at(result, result.first_sensed["wall"]) == pytest.approx(0.4, abs=0.12)
     # The lamp hangs 1.3 m above: nowhere is it within range, and neither is the post that the robot passes by 1.9 m.
     assert set(result.first_sensed) == {"ground", "wall"}
-    assert all(result.first_sensed[name] <= seconds for name, seconds in result.first_touched.items())
+    assert all(
+        result.first_sensed[name] <= seconds for name, seconds in result.first_touched.items()
+    )
 
 
 def test_what_is_behind_is_not_sensed_until_the_robot_turns(world_of, husky, scenario_of):
-    models = (box_model("ahead", "3 0.5 0.5 0 0 0", "0.2 0.2 1"), box_model("behind", "-3 2 0.5 0 0 0", "0.2 0.2 1"))
+    models = (
+        box_model("ahead", "3 0.5 0.5 0 0 0", "0.2 0.2 1"),
+        box_model("behind", "-3 2 0.5 0 0 0", "0.2 0.2 1"),
+    )
     narrow = {"sensors": {"view_range": 5.0, "view_angle": math.radians(90)}}
     straight = Template(world_of(*models), husky, scenario_of(**narrow))
     result = run(straight, "ahead", "behind")
     assert result.first_sensed["ahead"] == 0.0
     assert "behind" not in result.first_sensed
-    turning = run(Template(world_of(*models), husky, scenario_of(**narrow, goal={"x": -3, "y": 0})), "ahead", "behind")
+    turning = run(
+        Template(world_of(*models), husky, scenario_of(**narrow, goal={"x": -3, "y": 0})),
+        "ahead",
+        "behind",
+    )
     assert turning.first_sensed["behind"] > 0.5
     all_round = {"sensors": {"view_range": 5.0}}
-    assert run(Template(world_of(*models), husky, scenario_of(**all_round)), "behind").first_sensed["behind"] == 0.0
+    assert (
+        run(Template(world_of(*models), husky, scenario_of(**all_round)), "behind").first_sensed[
+            "behind"
+        ]
+        == 0.0
+    )
 
 
 def test_removed_models_are_never_noticed(world_of, add, husky, scenario_of):
@@ -90,8 +107,12 @@ def test_removed_models_are_never_noticed(world_of, add, husky, scenario_of):
 def test_a_moving_model_is_sensed_where_it_is_by_now(world_of, add, husky, scenario_of):
     # It falls past the edge of the view, 6 m beside the robot, which never comes near.
     ball = model_of("ball", link_of("link", Sphere(0.2), Pose((0.0, 6.0, 5.2))))
-    scenario = scenario_of(sensors={"view_range": 6.0}, goal={"x": 0.0, "y": -20.0}, failure={"timeout": 2.0})
-    scenario = scenario.model_copy(update={"controller": scenario.controller.model_copy(update={"speed": 1e-6})})
+    scenario = scenario_of(
+        sensors={"view_range": 6.0}, goal={"x": 0.0, "y": -20.0}, failure={"timeout": 2.0}
+    )
+    scenario = scenario.model_copy(
+        update={"controller": scenario.controller.model_copy(update={"speed": 1e-6})}
+    )
     far = model_of("far", link_of("link", Sphere(0.2), Pose((0.0, 30.0, 0.2))))
     result = run(Template(add(world_of(), far, ball), husky, scenario), "ball", "far")
     assert "far" not in result.first_sensed
@@ -101,14 +122,20 @@ def test_a_moving_model_is_sensed_where_it_is_by_now(world_of, add, husky, scena
     assert 0.5 < result.first_sensed["ball"] < 1.0
 
 
-def test_a_moving_model_that_slept_is_touched_where_the_robot_finds_it(world_of, add, husky, scenario_of):
+def test_a_moving_model_that_slept_is_touched_where_the_robot_finds_it(
+    world_of, add, husky, scenario_of
+):
     crates = [
         model_of(name, link_of("link", Box((0.3, 0.3, 0.3)), Pose((x, 0.0, z))))
         for name, x, z in (("near", 1.5, 0.15), ("pushed", 1.9, 0.15))
     ]
     leaf = link_of("leaf", Box((0.05, 0.5, 0.5)), Pose((-2.0, 3.0, 0.6)))
-    door = model_of("door", leaf, joints=(joint_of("revolute", "world", "leaf", (-2.0, 3.25, 0.6)),))
-    template = Template(add(world_of(), *crates, door), husky, scenario_of(failure={"timeout": 3.0}))
+    door = model_of(
+        "door", leaf, joints=(joint_of("revolute", "world", "leaf", (-2.0, 3.25, 0.6)),)
+    )
+    template = Template(
+        add(world_of(), *crates, door), husky, scenario_of(failure={"timeout": 3.0})
+    )
     result = run(template, "near", "pushed", "door")
     assert set(result.first_touched) == {"ground", "near"}
     # Contacts are looked at every 0.1 s, and the crate may jump ahead for a moment.
@@ -128,7 +155,9 @@ def test_what_lies_on_each_other_beside_the_robot_is_not_touched(world_of, add, 
     assert set(result.first_touched) == {"ground"}
 
 
-def test_what_is_touched_out_of_view_was_sensed_then_although_it_is_seen_later(world_of, husky, scenario_of):
+def test_what_is_touched_out_of_view_was_sensed_then_although_it_is_seen_later(
+    world_of, husky, scenario_of
+):
     post = box_model("post", "-0.6 0 0.3 0 0 0", "0.22 0.1 0.6")
     sensors = {"view_range": 5.0, "view_angle": math.radians(300)}
     template = Template(world_of(post), husky, scenario_of(goal={"x": 0, "y": 3}, sensors=sensors))
@@ -137,7 +166,9 @@ def test_what_is_touched_out_of_view_was_sensed_then_although_it_is_seen_later(w
     assert result.first_sensed["post"] == result.first_touched["post"]
 
 
-def test_links_that_are_fixed_in_the_world_are_part_of_their_model(world_of, add, husky, scenario_of):
+def test_links_that_are_fixed_in_the_world_are_part_of_their_model(
+    world_of, add, husky, scenario_of
+):
     frame = link_of("frame", Box((0.2, 4.0, 1.0)), Pose((1.5, 0.0, 0.5)))
     flap = link_of("flap", Box((0.1, 0.1, 0.3)), Pose((1.5, 3.0, 1.0)))
     joints = (
@@ -145,18 +176,27 @@ def test_links_that_are_fixed_in_the_world_are_part_of_their_model(world_of, add
         joint_of("revolute", "frame", "flap", (1.5, 3.0, 1.2)),
     )
     gate = model_of("gate", frame, flap, joints=joints)
-    result = run(Template(add(world_of(), gate), husky, scenario_of(failure={"timeout": 3.0})), "gate")
+    result = run(
+        Template(add(world_of(), gate), husky, scenario_of(failure={"timeout": 3.0})), "gate"
+    )
     assert x_at(result, result.first_touched["gate"]) + FRONT == pytest.approx(1.4, abs=0.06)
 
 
 @pytest.mark.parametrize("sleeping", slow(pytest.mark.rates, [True, False], but=[True]))
-def test_noticing_changes_no_bit_of_a_run_with_moving_models(world_of, add, husky, scenario_of, monkeypatch, sleeping):
+def test_noticing_changes_no_bit_of_a_run_with_moving_models(
+    world_of, add, husky, scenario_of, monkeypatch, sleeping
+):
     tower = [
-        model_of(f"storey_{number}", link_of("link", Box((0.3, 0.3, 0.3)), Pose((1.5, 0.1, 0.15 + 0.3 * number))))
+        model_of(
+            f"storey_{number}",
+            link_of("link", Box((0.3, 0.3, 0.3)), Pose((1.5, 0.1, 0.15 + 0.3 * number))),
+        )
         for number in range(3)
     ]
     # At some of these instants a row is recorded, but no command is due.
-    scenario = scenario_of(sensors={"view_range": 1.0}, controller={"period": 0.03}, failure={"timeout": 4.0})
+    scenario = scenario_of(
+        sensors={"view_range": 1.0}, controller={"period": 0.03}, failure={"timeout": 4.0}
+    )
     template = Template(add(world_of(WALL), *tower), husky, scenario)
     template._sleeping = sleeping
     names = [model.name for model in tower]
@@ -172,7 +212,9 @@ def test_in_view_agrees_with_looking_at_many_points_of_each_box():
     low = random.uniform(-4, 4, (300, 3)) * (1, 1, 0.3)
     high = low + random.uniform(0.2, 4, (300, 3))
     view_range = 2.5
-    grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 41)] * 2, [0.0, 0.5, 1.0]), axis=-1).reshape(-1, 3)
+    grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 41)] * 2, [0.0, 0.5, 1.0]), axis=-1).reshape(
+        -1, 3
+    )
 
     def some(heading: float, view_range: float, view_angle: float) -> np.ndarray:
         points = low[:, None] + grid * (high - low)[:, None]
@@ -203,10 +245,14 @@ def test_reach_is_that_of_the_farthest_part_however_the_joints_stand(husky):
     # A box around all places of the arm, which turns about its hinge.
     far = 1 + corner
     assert reach_of(model_of("robot", base)) == pytest.approx(0.5)
-    assert reach_of(model_of("robot", base, arm, joints=(hinge,))) == pytest.approx(math.hypot(1 + far, far, far))
+    assert reach_of(model_of("robot", base, arm, joints=(hinge,))) == pytest.approx(
+        math.hypot(1 + far, far, far)
+    )
     assert reach_of(model_of("robot", base, arm)) >= ENDLESS
     slide = joint_of("prismatic", "base", "arm", (5.0, 0.0, 1.0), lower=-3.0, upper=1.0)
-    assert reach_of(model_of("robot", base, arm, joints=(slide,))) == pytest.approx(math.sqrt(3) * (3 + corner))
+    assert reach_of(model_of("robot", base, arm, joints=(slide,))) == pytest.approx(
+        math.sqrt(3) * (3 + corner)
+    )
     endless = joint_of("prismatic", "base", "arm", (5.0, 0.0, 1.0))
     assert reach_of(model_of("robot", base, arm, joints=(endless,))) >= ENDLESS
     # What hangs on the arm may be named before it.

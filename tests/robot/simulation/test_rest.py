@@ -57,7 +57,9 @@ def test_at_the_border_of_f_a_robot_is_watched_to_the_end(at_the_wall, in_full):
 
 def test_while_its_controller_still_drives_a_robot_is_not_at_rest(world_of, husky, scenario_of):
     """It stands at a wall for longer than any patience, with wheels that spin towards a goal far away."""
-    template = Template(world_of(WALL), husky, scenario_of(goal={"x": 90.0, "y": 0.0}, failure={"timeout": 14.0}))
+    template = Template(
+        world_of(WALL), husky, scenario_of(goal={"x": 90.0, "y": 0.0}, failure={"timeout": 14.0})
+    )
     result = template.run(EVERYTHING, seed=1)
     late = result.trajectory[result.trajectory[:, 0] > 4.0, 1:4]
     assert np.linalg.norm(late - late[-1], axis=1).max() < 0.05
@@ -71,13 +73,19 @@ def test_a_robot_that_slides_slowly_is_not_stuck(husky, scenario_of, monkeypatch
     floor = box_model("floor", "0 0 -0.5 0 0 0", "60 20 1")
     text = f'<sdf version="1.9"><world name="w">{gravity}{floor}</world></sdf>'
     scenario = scenario_of(goal={"x": 40.0, "y": 0.0}, failure={"timeout": 40.0})
-    template, keep = Template(parse_world(text.encode(), Path("w.sdf")), husky, scenario), frozenset({"floor"})
+    template, keep = (
+        Template(parse_world(text.encode(), Path("w.sdf")), husky, scenario),
+        frozenset({"floor"}),
+    )
     result = template.run(keep, seed=1)
     places = {at: result.trajectory[10 * at, 1:4] for at in (2, 10, 40)}
     assert math.dist(places[2], places[10]) < 0.05 < math.dist(places[10], places[40])
     for place in places.values():
         f = Failure(tuple(place.tolist()), result.trajectory, epsilon=0.05)
-        assert judge(template.run(keep, seed=1, ends=ends_of([f])), f).outcome == judge(result, f).outcome
+        assert (
+            judge(template.run(keep, seed=1, ends=ends_of([f])), f).outcome
+            == judge(result, f).outcome
+        )
 
 
 numbers = st.floats(-2.0, 2.0)
@@ -91,7 +99,9 @@ numbers = st.floats(-2.0, 2.0)
     grows=st.floats(0.0, 0.01),
     suffice=st.booleans(),
 )
-def test_whatever_slides_on_as_it_began_ends_in_the_verdict_that_it_got(f, goal, start, speed, grows, suffice):
+def test_whatever_slides_on_as_it_began_ends_in_the_verdict_that_it_got(
+    f, goal, start, speed, grows, suffice
+):
     """It slides along x from `start` (s) on, at `speed` (m/s) that grows by `grows` (m/s^2)."""
     ends, until = Ends(((*f, 0.0),), 0.33, suffice), 45.0
     rest = Rest(ends, Goal(x=goal[0], y=goal[1], tolerance=0.5), until)

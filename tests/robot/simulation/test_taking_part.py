@@ -22,8 +22,12 @@ SECTIONS = {"failure": {"timeout": 3.0}, "goal": {"x": 9, "y": 0}}
 SEES = {"sensors": {"lidar": {"range": 6.0}}, "controller": {"use": "costmap"}}
 
 
-def still(name: str, x: float, y: float, size: tuple[float, float, float], z: float | None = None) -> Model:
-    return model_of(name, link_of("link", Box(size), Pose((x, y, size[2] / 2 if z is None else z)), mass=None))
+def still(
+    name: str, x: float, y: float, size: tuple[float, float, float], z: float | None = None
+) -> Model:
+    return model_of(
+        name, link_of("link", Box(size), Pose((x, y, size[2] / 2 if z is None else z)), mass=None)
+    )
 
 
 @pytest.fixture(scope="session")
@@ -52,7 +56,9 @@ def sensed(result: RunResult, names: frozenset[str]) -> dict[str, float]:
     return {name: at for name, at in result.first_sensed.items() if name in names}
 
 
-def is_implied(world: Variants, there: frozenset[str], more: frozenset[str] = frozenset(), seed: int = 1) -> bool:
+def is_implied(
+    world: Variants, there: frozenset[str], more: frozenset[str] = frozenset(), seed: int = 1
+) -> bool:
     """Whether a run of `there` has the same bits with only what took part, `more` of it, and what these are tied to; and senses
     what took part at the same times.
     """
@@ -60,13 +66,15 @@ def is_implied(world: Variants, there: frozenset[str], more: frozenset[str] = fr
     keep = with_ties(world, (whole.took_part & there) | (more & there), there)
     part = world.run(keep, seed)
     took_part = whole.took_part & there
-    return bits(part, *part.motions.keys() - keep) == bits(whole, *whole.motions.keys() - keep) and sensed(
-        part, took_part
-    ) == sensed(whole, took_part)
+    return bits(part, *part.motions.keys() - keep) == bits(
+        whole, *whole.motions.keys() - keep
+    ) and sensed(part, took_part) == sensed(whole, took_part)
 
 
 def test_every_bump_under_the_wheels_takes_part(flat):
-    bumps = [still(f"bump_{number}", 0.6 + 0.17 * number, 0.3, (0.04, 0.3, 0.001)) for number in range(8)]
+    bumps = [
+        still(f"bump_{number}", 0.6 + 0.17 * number, 0.3, (0.04, 0.3, 0.001)) for number in range(8)
+    ]
     far = still("far", 2.0, 4.0, (0.5, 0.5, 0.5))
     world = flat(*bumps, far)
     assert world.run(names(*bumps, far), 1).took_part & names(*bumps, far) == names(*bumps)
@@ -86,7 +94,10 @@ def test_a_model_takes_part_if_a_beam_ends_on_it_that_somebody_reads(flat):
 
 def test_what_took_part_is_sensed_at_the_same_time_whatever_else_hides_it(flat):
     """The robot runs into a wall, which a screen aside hides at first from a lidar that looks across. Nobody reads its scans."""
-    wall, screen = still("wall", 3.0, 0.0, (0.2, 0.4, 1.5)), still("screen", 1.2, 1.4, (0.1, 0.5, 1.5))
+    wall, screen = (
+        still("wall", 3.0, 0.0, (0.2, 0.4, 1.5)),
+        still("screen", 1.2, 1.4, (0.1, 0.5, 1.5)),
+    )
     world = flat(wall, screen, sensors={"lidar": {"y": 2.0}})
     result = world.run(names(wall, screen), 1)
     assert result.took_part & names(wall, screen) == names(wall)
@@ -97,7 +108,9 @@ def test_what_took_part_is_sensed_at_the_same_time_whatever_else_hides_it(flat):
 def test_what_the_map_cannot_hold_takes_no_part_although_beams_end_on_it(flat):
     near, far = still("near", 5.0, 2.0, (0.5, 0.5, 2.0)), still("far", 9.0, 6.0, (0.5, 0.5, 2.0))
     beyond = still("beyond", 12.0, 8.0, (3.0, 3.0, 4.0))
-    world = flat(near, far, beyond, sensors={"lidar": {"range": 20.0}}, controller={"use": "costmap"})
+    world = flat(
+        near, far, beyond, sensors={"lidar": {"range": 20.0}}, controller={"use": "costmap"}
+    )
     result = world.run(names(near, far, beyond), 1)
     assert {"far", "beyond"} <= set(result.first_sensed)
     assert result.took_part & names(near, far, beyond) == {"near"}
@@ -116,7 +129,10 @@ def test_what_stands_on_a_shelf_is_tied_to_it(flat):
 def test_what_an_always_kept_model_is_tied_to_takes_part(world_of, add, husky, scenario_of):
     shelf, ball = still("shelf", 2.0, 3.0, (0.4, 0.4, 0.5)), cube("ball", 2.0, 3.0, 0.65)
     scenario = scenario_of(**SECTIONS, protected=["ball"])
-    assert "shelf" in Variants(add(world_of(), shelf, ball), husky, scenario).run(names(shelf), 1).took_part
+    assert (
+        "shelf"
+        in Variants(add(world_of(), shelf, ball), husky, scenario).run(names(shelf), 1).took_part
+    )
 
 
 def test_what_lies_beside_what_is_pushed_sleeps_on(flat):
@@ -129,7 +145,9 @@ def test_what_lies_beside_what_is_pushed_sleeps_on(flat):
 
 def test_what_wakes_another_model_takes_part_although_it_sleeps_on(flat):
     # A ball rolls slowly past a cube, 9.5 cm away: near enough to be simulated from there on.
-    hill = model_of("hill", link_of("link", wedge(1.0, 1.0, 0.03), Pose((2.0, 3.0, 0.015)), mass=None))
+    hill = model_of(
+        "hill", link_of("link", wedge(1.0, 1.0, 0.03), Pose((2.0, 3.0, 0.015)), mass=None)
+    )
     ball = model_of("ball", link_of("link", Sphere(0.2), Pose((2.4, 3.4, 0.23))))
     passed = cube("passed", 1.9, 3.845, 0.15)
     result = flat(hill, ball, passed).run(names(hill, ball, passed), 1)
@@ -139,7 +157,10 @@ def test_what_wakes_another_model_takes_part_although_it_sleeps_on(flat):
 
 
 def test_nothing_is_claimed_where_it_is_unknown(flat):
-    assert flat(cube("own", 2, 3, 0.15, self_collide=True)).run(frozenset({"own"}), 1).took_part is None
+    assert (
+        flat(cube("own", 2, 3, 0.15, self_collide=True)).run(frozenset({"own"}), 1).took_part
+        is None
+    )
     assert flat(cube("own", 2, 3, 0.15, self_collide=True)).ties(frozenset({"own"})) is None
     own = {"controller": {"use": "ddenv.robot.navigation.navigate:Straight"}}
     assert flat(cube("other", 2, 3, 0.15), **own).run(frozenset({"other"}), 1).took_part is None
@@ -151,9 +172,17 @@ KINDS = {
     "tile": lambda name, x, y: [still(name, x, y, (0.5, 0.4, 0.02))],
     "wall": lambda name, x, y: [still(name, x, y, (0.2, 0.6, 1.0))],
     "door": lambda name, x, y: [door(name, x, y, damping=0.5)],
-    "pile": lambda name, x, y: [cube(f"{name}_low", x, y, 0.15), cube(f"{name}_high", x + 0.1, y, 0.46)],
-    "shelf": lambda name, x, y: [still(name, x, y, (0.4, 0.4, 0.4)), cube(f"{name}_cube", x, y, 0.55)],
-    "ball": lambda name, x, y: [model_of(f"{name}_ball", link_of("link", Sphere(0.2), Pose((x, y, 0.8)), 1.0))],
+    "pile": lambda name, x, y: [
+        cube(f"{name}_low", x, y, 0.15),
+        cube(f"{name}_high", x + 0.1, y, 0.46),
+    ],
+    "shelf": lambda name, x, y: [
+        still(name, x, y, (0.4, 0.4, 0.4)),
+        cube(f"{name}_cube", x, y, 0.55),
+    ],
+    "ball": lambda name, x, y: [
+        model_of(f"{name}_ball", link_of("link", Sphere(0.2), Pose((x, y, 0.8)), 1.0))
+    ],
 }
 WORLDS = st.lists(st.tuples(st.sampled_from(sorted(KINDS)), PLACES), min_size=3, max_size=8)
 
@@ -161,7 +190,11 @@ WORLDS = st.lists(st.tuples(st.sampled_from(sorted(KINDS)), PLACES), min_size=3,
 @examples(0.2)
 @given(placed=WORLDS, sees=st.booleans(), data=st.data())
 def test_any_part_with_all_that_took_part_gives_the_same_bits(flat, placed, sees, data):
-    models = [one for number, (kind, place) in enumerate(placed) for one in KINDS[kind](f"{kind}_{number}", *place)]
+    models = [
+        one
+        for number, (kind, place) in enumerate(placed)
+        for one in KINDS[kind](f"{kind}_{number}", *place)
+    ]
     everything = sorted(names(*models))
     world = flat(*models, **(SEES if sees else {}), failure={"timeout": 2.0})
     some = st.lists(st.sampled_from(everything)).map(frozenset)
@@ -173,9 +206,15 @@ def test_any_part_with_all_that_took_part_gives_the_same_bits(flat, placed, sees
 
 @pytest.mark.rates
 def test_the_audit_finds_each_kind_of_participant_that_is_forgotten(flat, monkeypatch):
-    bump, wall = still("bump", 0.8, 0.3, (0.04, 0.3, 0.01)), still("wall", 1.8, 0.5, (0.3, 0.6, 1.0))
+    bump, wall = (
+        still("bump", 0.8, 0.3, (0.04, 0.3, 0.01)),
+        still("wall", 1.8, 0.5, (0.3, 0.6, 1.0)),
+    )
     crate, stop = cube("crate", 1.2, 0.0, 0.15), still("stop", 2.2, 0.0, (0.1, 0.3, 0.05))
-    shelf, ball = still("shelf", 1.5, -0.25, (0.3, 0.3, 0.02), z=0.9), cube("ball", 1.5, -0.25, 1.07)
+    shelf, ball = (
+        still("shelf", 1.5, -0.25, (0.3, 0.3, 0.02), z=0.9),
+        cube("ball", 1.5, -0.25, 1.07),
+    )
     table = still("table", 1.5, 3.0, (0.6, 0.6, 0.3))
     high = still("high", 1.5, 3.0, (0.3, 0.3, 0.02), z=0.9), cube("lamp", 1.5, 3.0, 1.07), table
     worlds = {

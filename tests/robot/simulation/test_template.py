@@ -23,7 +23,11 @@ NOTHING = frozenset()
 
 
 def same(a, b) -> bool:
-    return a.outcome == b.outcome and a.failure == b.failure and a.trajectory.tobytes() == b.trajectory.tobytes()
+    return (
+        a.outcome == b.outcome
+        and a.failure == b.failure
+        and a.trajectory.tobytes() == b.trajectory.tobytes()
+    )
 
 
 def test_reaches_its_goal_on_flat_ground(world_of, husky, scenario_of):
@@ -39,7 +43,9 @@ def test_reaches_its_goal_on_flat_ground(world_of, husky, scenario_of):
     assert result.motions == {}
 
 
-def test_trajectory_has_a_row_each_tenth_of_a_second_and_one_at_the_end(world_of, husky, scenario_of):
+def test_trajectory_has_a_row_each_tenth_of_a_second_and_one_at_the_end(
+    world_of, husky, scenario_of
+):
     scenario = scenario_of(failure={"timeout": 1.23}, controller={"period": 0.03})
     trajectory = Template(world_of(), husky, scenario).run(NOTHING, seed=1).trajectory
     assert trajectory.dtype == np.float64
@@ -55,35 +61,50 @@ def test_starts_where_the_scenario_says(world_of, husky, scenario_of):
     assert start[1:] == pytest.approx([1.5, -2.0, 0.14, np.cos(0.5), 0, 0, np.sin(0.5)])
 
 
-def test_a_robot_with_a_pose_of_its_own_starts_where_the_scenario_says(world_of, husky, scenario_of):
+def test_a_robot_with_a_pose_of_its_own_starts_where_the_scenario_says(
+    world_of, husky, scenario_of
+):
     at = Pose.from_rpy(1.0, 2.0, 3.0, 0.0, 0.0, 0.5)
     links = tuple(replace(link, pose=at @ link.pose) for link in husky.links)
-    joints = tuple(replace(joint, pose=at @ joint.pose, axis=tuple(at.rotate(joint.axis))) for joint in husky.joints)
+    joints = tuple(
+        replace(joint, pose=at @ joint.pose, axis=tuple(at.rotate(joint.axis)))
+        for joint in husky.joints
+    )
     posed = replace(husky, pose=at @ husky.pose, links=links, joints=joints)
     starts = [
-        Template(world_of(), robot, scenario_of(failure={"timeout": 0.2})).run(NOTHING, seed=1).trajectory[0, 1:]
+        Template(world_of(), robot, scenario_of(failure={"timeout": 0.2}))
+        .run(NOTHING, seed=1)
+        .trajectory[0, 1:]
         for robot in (husky, posed)
     ]
     assert starts[1] == pytest.approx(starts[0], abs=1e-9)
 
 
 def test_protected_models_and_the_ground_stay(world_of, husky, scenario_of, box):
-    template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of(protected=("wall",)))
+    template = Template(
+        world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of(protected=("wall",))
+    )
     assert same(template.run(NOTHING, seed=1), template.run(frozenset({"wall", "ground"}), seed=1))
     assert template.run(NOTHING, seed=1).failure == "stuck"
 
 
 def test_what_others_depend_on_stays(world_of, husky, scenario_of, box):
-    world = world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1"), box("lamp", "0 9 0.5 0 0 0", "1 1 1"))
+    world = world_of(
+        box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1"), box("lamp", "0 9 0.5 0 0 0", "1 1 1")
+    )
     anchored = Template(replace(world, anchors=frozenset({"wall"})), husky, scenario_of())
     assert anchored.run(NOTHING, seed=1).failure == "stuck"
-    tied = Template(replace(world, anchors=frozenset({"lamp"}), ties=(("lamp", "wall"),)), husky, scenario_of())
+    tied = Template(
+        replace(world, anchors=frozenset({"lamp"}), ties=(("lamp", "wall"),)), husky, scenario_of()
+    )
     assert tied.run(NOTHING, seed=1).failure == "stuck"
 
 
 def test_falls_out_of_a_world_without_ground(world_of, husky, scenario_of, box):
     world = world_of(box("table", "0 0 -0.5 0 0 0", "3 3 1"), ground=False)
-    result = Template(world, husky, scenario_of(goal={"x": 50, "y": 0})).run(frozenset({"table"}), seed=1)
+    result = Template(world, husky, scenario_of(goal={"x": 50, "y": 0})).run(
+        frozenset({"table"}), seed=1
+    )
     assert (result.outcome, result.failure) == ("failed", "fell")
     assert result.end_pose[2] < -3.0
     assert result.simulated_seconds < 10.0
@@ -95,7 +116,9 @@ def test_unknown_models_are_refused(world_of, husky, scenario_of):
 
 
 def test_progress_gets_every_row_and_the_models_that_can_move(world_of, husky, scenario_of, box):
-    world = world_of(box("ball", "2 0 0.2 0 0 0", "0.4 0.4 0.4", mass=5.0), box("wall", "9 0 1 0 0 0", "1 1 2"))
+    world = world_of(
+        box("ball", "2 0 0.2 0 0 0", "0.4 0.4 0.4", mass=5.0), box("wall", "9 0 1 0 0 0", "1 1 2")
+    )
     rows, places = [], []
 
     def hear(time_s: float, pose: tuple[float, ...], models: dict) -> None:
@@ -106,7 +129,10 @@ def test_progress_gets_every_row_and_the_models_that_can_move(world_of, husky, s
     result = template.run(frozenset({"ball", "wall"}), 1, hear)
     assert np.array(rows).tobytes() == result.trajectory.tobytes()
     assert {name for models in places for name in models} == {"ball"}
-    assert np.array([models["ball"] for models in places]).tobytes() == result.motions["ball"][:, 1:].tobytes()
+    assert (
+        np.array([models["ball"] for models in places]).tobytes()
+        == result.motions["ball"][:, 1:].tobytes()
+    )
 
 
 def test_numbers_that_are_not_finite_are_an_error_and_leave_no_trace(world_of, husky, scenario_of):
@@ -139,12 +165,19 @@ def test_what_breaks_in_progress_is_the_callers(world_of, husky, scenario_of, bo
 
 
 def test_a_world_drake_cannot_simulate_is_the_users(world_of, add, husky, scenario_of):
-    ghost = replace(model_of("ghost", link_of("link", Sphere(0.5), Pose((2.0, 2.0, 0.5)), mass=None)), static=False)
+    ghost = replace(
+        model_of("ghost", link_of("link", Sphere(0.5), Pose((2.0, 2.0, 0.5)), mass=None)),
+        static=False,
+    )
     heavy = link_of("link", Sphere(0.5), Pose((2.0, 2.0, 0.5)))
-    heavy = model_of("heavy", replace(heavy, inertia=replace(heavy.inertia, moments=(1.0, 1.0, 9.0))))
+    heavy = model_of(
+        "heavy", replace(heavy, inertia=replace(heavy.inertia, moments=(1.0, 1.0, 9.0)))
+    )
     links = [link_of(name, Sphere(0.1), Pose((float(x), 3.0, 1.0))) for x, name in enumerate("abc")]
     pairs = (("a", "b"), ("b", "c"), ("a", "c"))
-    loop = model_of("loop", *links, joints=tuple(joint_of("ball", *pair, (0.0, 3.0, 1.0)) for pair in pairs))
+    loop = model_of(
+        "loop", *links, joints=tuple(joint_of("ball", *pair, (0.0, 3.0, 1.0)) for pair in pairs)
+    )
     for model, complaint in ((ghost, r"ghost.*no <inertial>"), (heavy, ""), (loop, "")):
         with pytest.raises(UserError, match=f"cannot be simulated.*{complaint}"):
             Template(add(world_of(), model), husky, scenario_of())
@@ -186,7 +219,9 @@ def built(monkeypatch) -> list[frozenset[str]]:
 @pytest.fixture
 def cubes(world_of, add) -> World:
     """A cube in the robot's way, a pile of two that falls beside it, a cube far away."""
-    return add(world_of(), cube("a", 1.2, 0), cube("b", 1, 3), cube("c", 1, 3.1, 0.5), cube("d", 5, -9))
+    return add(
+        world_of(), cube("a", 1.2, 0), cube("b", 1, 3), cube("c", 1, 3.1, 0.5), cube("d", 5, -9)
+    )
 
 
 @pytest.fixture
@@ -196,7 +231,9 @@ def scenario(scenario_of) -> Scenario:
 
 def rubble() -> tuple[World, Model, Scenario]:
     scenario = load_scenario(SCENARIOS / "rubble.yaml")
-    short = scenario.model_copy(update={"failure": scenario.failure.model_copy(update={"timeout": 6.0})})
+    short = scenario.model_copy(
+        update={"failure": scenario.failure.model_copy(update={"timeout": 6.0})}
+    )
     return *load_parts(scenario), short
 
 
@@ -254,7 +291,9 @@ TOO_DEAR = {"BUILD": 1.0, "PAIR": 1.0, "LARGEST": 3, "HELD": 0.0}
 
 
 @pytest.mark.parametrize("limit", slow(pytest.mark.rates, TOO_DEAR, but=["LARGEST"]))
-def test_no_plant_is_built_that_costs_more_than_it_saves(cubes, husky, scenario, built, monkeypatch, limit):
+def test_no_plant_is_built_that_costs_more_than_it_saves(
+    cubes, husky, scenario, built, monkeypatch, limit
+):
     monkeypatch.setattr(variants, limit, TOO_DEAR[limit])
     result = Variants(cubes, husky, scenario).run(ALL - {"d"}, 1)
     assert not built

@@ -31,8 +31,17 @@ ENDED = (fake_moments.finished, fake_moments.helped)
 
 def seen(app):
     """All that a user can notice."""
-    cells = [[(part.text, part.style) for part in strip] for strip in app.screen._compositor.render_strips()]
-    return app.screen, app.screen.focused, cells, [each.message for each in app._notifications], app.clipboard
+    cells = [
+        [(part.text, part.style) for part in strip]
+        for strip in app.screen._compositor.render_strips()
+    ]
+    return (
+        app.screen,
+        app.screen.focused,
+        cells,
+        [each.message for each in app._notifications],
+        app.clipboard,
+    )
 
 
 def offered(app):
@@ -44,7 +53,9 @@ def opened(run, name):
     if name in OF_A_RUN:
         return Workbench(run.path), OF_A_RUN[name][1]
     lesson = open_lesson(bundled()[0]).lesson.file
-    return Workbench(first=(lambda: LessonsScreen(lesson)) if name == "lesson" else None), OTHERS[name]
+    return Workbench(first=(lambda: LessonsScreen(lesson)) if name == "lesson" else None), OTHERS[
+        name
+    ]
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[SMALL]), ids=str)
@@ -62,7 +73,9 @@ async def test_each_key_of_the_footer_does_something(run, scenarios, started, na
             for key in way:
                 await pilot.press(key)
                 await settled(pilot)
-            left = await press_all(app, pilot, pressed, lambda: (len(run.file.commands()), len(started)))
+            left = await press_all(
+                app, pilot, pressed, lambda: (len(run.file.commands()), len(started))
+            )
     assert len(pressed) > 2
 
 
@@ -79,7 +92,9 @@ async def press_all(app, pilot, pressed, asked):
             await settled(pilot)
         before = seen(app), asked()
         await pilot.press(key)
-        await eventually(lambda: not app.is_running or (seen(app), asked()) != before, lambda: f"{key}: nothing")  # noqa: B023
+        await eventually(
+            lambda: not app.is_running or (seen(app), asked()) != before, lambda: f"{key}: nothing"
+        )  # noqa: B023
         while app.is_running and screen in app.screen_stack and app.screen is not screen:
             await pilot.press("escape")
             await pilot.pause()

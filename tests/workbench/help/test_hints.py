@@ -27,7 +27,12 @@ def hints(screen):
 
 
 def test_each_key_has_the_words_behind_it():
-    said = {"enter opens": "enter", "← → other tests": "left", "tab or click chooses": "tab", "^o opens": "ctrl+o"}
+    said = {
+        "enter opens": "enter",
+        "← → other tests": "left",
+        "tab or click chooses": "tab",
+        "^o opens": "ctrl+o",
+    }
     found = clickable("   ".join(said))
     assert found.plain == "   ".join(said)
     assert {found.plain[at.start : at.end]: at.style.meta["key"] for at in found.spans} == said
@@ -45,7 +50,9 @@ async def test_a_dialog_obeys_each_key_that_it_shows_and_closes_by_a_click(run, 
         screen, shown = app.screen, hints(app.screen)
         assert set(shown) - OF_WIDGETS <= set(screen.active_bindings), name
         if screen.is_modal and screen.query(Framed):
-            assert await pilot.click(offset=next(shown[key] for key in ("escape", "n", "c") if key in shown))
+            assert await pilot.click(
+                offset=next(shown[key] for key in ("escape", "n", "c") if key in shown)
+            )
             await eventually(lambda: app.screen is not screen)
 
 
@@ -54,7 +61,9 @@ async def test_a_click_in_a_pane_without_the_focus_is_for_this_pane(scenarios, r
     fake_moments.finished(fake_run.FakeRun(runs / "crates-1.ddenv")).close()
     app = Workbench()
     async with app.run_test(size=USUAL) as pilot:
-        await eventually(lambda: len(app.screen.query(RunList)) and app.screen.query_one(RunList).option_count)
+        await eventually(
+            lambda: len(app.screen.query(RunList)) and app.screen.query_one(RunList).option_count
+        )
         await pilot.pause()
         assert not app.screen.query_one(RunList).has_focus
         await pilot.click(offset=hints(app.screen)["enter"])

@@ -25,7 +25,9 @@ def text(pilot):
 
 
 def footer(pilot):
-    return [f"{entry.shown} {entry.words}" for entry in pilot.app.screen.query_one(KeyFooter).entries]
+    return [
+        f"{entry.shown} {entry.words}" for entry in pilot.app.screen.query_one(KeyFooter).entries
+    ]
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
@@ -41,7 +43,9 @@ async def test_a_lesson_from_start_to_end(size):
                 wrong = (right + 1) % len(page.question.answers)
                 key = (LETTERS[right], LETTERS[wrong], "s")[turn % 3]
                 await pilot.press("enter")
-                assert screen.course.page.chosen is None, "an open question is not passed over unseen"
+                assert screen.course.page.chosen is None, (
+                    "an open question is not passed over unseen"
+                )
                 await pilot.press(key)
                 said = text(pilot)
                 assert ("✓ Right", "✗ No", "Skipped")[turn % 3] in said
@@ -56,7 +60,9 @@ async def test_a_lesson_from_start_to_end(size):
         row = pilot.app.screen.query_one(OptionList).get_option_at_index(0).prompt
         assert "done" in str(row)
     assert all_scores()[NAME].done
-    assert state_file("lessons.json").stat().st_mode & 0o077 == 0, "nobody else reads a student's answers"
+    assert state_file("lessons.json").stat().st_mode & 0o077 == 0, (
+        "nobody else reads a student's answers"
+    )
 
 
 async def test_enter_shows_the_rest_of_a_long_text_first():
@@ -125,7 +131,11 @@ async def test_what_was_said_before_an_answer_does_not_hide_what_is_said_of_it()
     async with opened((80, 24), step=2) as pilot:
         pane = pilot.app.screen.query_one(LessonPane)
         assert pane.parent.border_subtitle == "a to c, or ↑ ↓ and enter; s skips"
-        assert footer(pilot)[:3] == ["a to c answer", "s skip", "h hint"] and "enter go on" not in footer(pilot)
+        assert footer(pilot)[:3] == [
+            "a to c answer",
+            "s skip",
+            "h hint",
+        ] and "enter go on" not in footer(pilot)
         await pilot.press("enter")
         assert not pilot.app._notifications, "it would hide the answers"
         await pilot.press("backspace", "backspace", "backspace")
@@ -134,7 +144,9 @@ async def test_what_was_said_before_an_answer_does_not_hide_what_is_said_of_it()
         await pilot.pause()
         assert not pilot.app._notifications
         # Lines of a remark after its first stand below its words.
-        remark = next(line for line in text(pilot).splitlines() if line[1:4] == " ✓ " and line[0] in "abc")
+        remark = next(
+            line for line in text(pilot).splitlines() if line[1:4] == " ✓ " and line[0] in "abc"
+        )
         after = text(pilot).splitlines()[text(pilot).splitlines().index(remark) + 1]
         assert after.startswith("    ") and len(remark) <= 76
 
@@ -182,14 +194,18 @@ async def test_any_run_is_stepped_through_forward_and_back():
         await pilot.press("right", "right", "left", "left")
         assert course.at == begin
         await pilot.press("right_curly_bracket")
-        assert "E" in [one.name for one in pilot.app.screen.query_one(Variables)._variables if one.changed]
+        assert "E" in [
+            one.name for one in pilot.app.screen.query_one(Variables)._variables if one.changed
+        ]
         assert len(course.position.now.environment) == 6
         await pilot.press("left_parenthesis", "right_parenthesis", "right_parenthesis")
         await pilot.press("p")
         assert course.page.question is not None
         asked_at = course.at
         await pilot.press("enter")
-        assert course.at == asked_at and course.page.chosen is None, "an open question is not passed over"
+        assert course.at == asked_at and course.page.chosen is None, (
+            "an open question is not passed over"
+        )
         await pilot.press("down", "enter")
         assert course.page.chosen == 0
         await pilot.press("right", "p", "s")
@@ -202,7 +218,11 @@ async def test_any_run_is_stepped_through_forward_and_back():
 async def test_the_algorithm_is_shown_from_the_step_that_speaks_of_it_on():
     async with opened() as pilot:
         screen = pilot.app.screen
-        speaks = next(number for number, step in enumerate(screen._opened.lesson.steps) if "*Algorithm*" in step.text)
+        speaks = next(
+            number
+            for number, step in enumerate(screen._opened.lesson.steps)
+            if "*Algorithm*" in step.text
+        )
         assert speaks > 2 and not screen.query_one("#lesson-now").display
     async with opened(step=speaks) as pilot:
         assert pilot.app.screen.query_one("#lesson-now").display

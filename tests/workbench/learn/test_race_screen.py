@@ -15,7 +15,9 @@ from tests.waiting import eventually
 from tests.workbench.learn.opened import NAME, opened
 
 SIZES = slow(pytest.mark.screens, [(80, 24), (120, 36)], but=[(80, 24)])
-STEP = next(number for number, step in enumerate(open_lesson(bundled()[0]).lesson.steps) if step.race)
+STEP = next(
+    number for number, step in enumerate(open_lesson(bundled()[0]).lesson.steps) if step.race
+)
 
 
 def said(pilot, name="race-said"):
@@ -44,7 +46,9 @@ async def test_a_race_in_a_lesson(size):
         await pilot.press("end")
         await pilot.pause()
         assert "splitting needed the fewest tests: 7. ddenv needed the most: 14." in said(pilot)
-        assert "lost f" in said(pilot) and all(title.endswith("2 left ✓") for title in titles(pilot))
+        assert "lost f" in said(pilot) and all(
+            title.endswith("2 left ✓") for title in titles(pilot)
+        )
         await pilot.press("home")
         assert screen.race.at == 0 and "fewest" not in said(pilot)
         await pilot.press("escape")
@@ -58,10 +62,15 @@ async def test_a_race_in_a_lesson(size):
 @pytest.fixture
 def two_runs(tmp_path):
     """The run of the first lesson, and one that was stopped in the middle."""
-    whole, half = LESSONS / "delivery.ddenv", tmp_path / "a-run-with-quite-a-long-name-that-was-stopped.ddenv"
+    whole, half = (
+        LESSONS / "delivery.ddenv",
+        tmp_path / "a-run-with-quite-a-long-name-that-was-stopped.ddenv",
+    )
     shutil.copy(whole, half)
     with sqlite3.connect(half) as database:
-        ends = database.execute("SELECT id FROM event WHERE kind = 'test_finished' ORDER BY id").fetchall()
+        ends = database.execute(
+            "SELECT id FROM event WHERE kind = 'test_finished' ORDER BY id"
+        ).fetchall()
         database.execute("DELETE FROM event WHERE id >= ?", ends[19])
     return whole, half
 
@@ -76,7 +85,9 @@ async def test_runs_race_by_themselves_to_the_end(two_runs, size, monkeypatch):
         await eventually(lambda: screen.race.over)
         await pilot.pause()
         assert titles(pilot)[0] == "delivery · 38 tests · 3 left ✓"
-        assert "16 tests, stopped · 6 left" in titles(pilot)[1] and (size == (120, 36) or "…" in titles(pilot)[1])
+        assert "16 tests, stopped · 6 left" in titles(pilot)[1] and (
+            size == (120, 36) or "…" in titles(pilot)[1]
+        )
         assert "did not finish" in said(pilot) and "no winner" in said(pilot)
 
 
@@ -105,5 +116,7 @@ async def test_a_race_is_paused(two_runs, monkeypatch):
     ],
 )
 def test_runs_that_cannot_race_are_one_line(runs, words, monkeypatch, capsys):
-    said = in_process(monkeypatch, capsys, "learn", "--race", *(LESSONS / f"{name}.ddenv" for name in runs))
+    said = in_process(
+        monkeypatch, capsys, "learn", "--race", *(LESSONS / f"{name}.ddenv" for name in runs)
+    )
     assert said.returncode == 2 and words in said.stderr and said.stderr.count("\n") == 1

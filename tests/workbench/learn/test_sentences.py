@@ -35,14 +35,18 @@ QUICK = [run for run in RUNS if run.stem in ("delivery", "ditch-sliced")]
 SIGNS = {"similar": "●", "other": "◇", "pass": "○"}
 
 
-@pytest.mark.parametrize("run", slow(pytest.mark.screens, RUNS, but=QUICK), ids=lambda run: run.stem)
+@pytest.mark.parametrize(
+    "run", slow(pytest.mark.screens, RUNS, but=QUICK), ids=lambda run: run.stem
+)
 def test_every_sentence_fits_its_moment(run):
     seen = set()
     for moment, explained in moments(run):
         here = f"event {moment.recorded.id}, {moment.recorded.kind}: {explained}"
         assert explained.sentences, here
         # Nothing is said twice.
-        assert len({sentence.lower() for sentence in explained.sentences}) == len(explained.sentences), here
+        assert len({sentence.lower() for sentence in explained.sentences}) == len(
+            explained.sentences
+        ), here
         if (check := CHECKS.get(moment.recorded.kind)) is not None:
             lines = LINES[settings(moment.after).algorithm]
             seen |= {check(moment, explained, lines, " ".join(explained.sentences), here)}

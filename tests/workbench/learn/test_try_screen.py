@@ -13,7 +13,9 @@ from tests.waiting import eventually
 from tests.workbench.learn.opened import NAME, opened
 
 SIZES = slow(pytest.mark.screens, [(80, 24), (120, 36)], but=[(80, 24)])
-STEP = next(number for number, step in enumerate(open_lesson(bundled()[0]).lesson.steps) if step.budget)
+STEP = next(
+    number for number, step in enumerate(open_lesson(bundled()[0]).lesson.steps) if step.budget
+)
 
 
 async def begin(pilot):
@@ -41,20 +43,32 @@ async def test_a_search_by_keys_that_finds_a_minimal_set(size):
     async with opened(size, STEP) as pilot:
         screen = await begin(pilot)
         # The first model and the third.
-        await pilot.press(*["right_square_bracket", "enter", "right_square_bracket", "right_square_bracket", "space"])
+        await pilot.press(
+            *[
+                "right_square_bracket",
+                "enter",
+                "right_square_bracket",
+                "right_square_bracket",
+                "space",
+            ]
+        )
         await pilot.pause()
         assert "*bench" in said(pilot) and "*plant" in said(pilot) and "2 marked" in said(pilot)
         await pilot.press("w")
         await pilot.pause()
         assert len(screen.attempt.held) == 6 and "f again without bench, plant" in said(pilot)
-        assert "without bench, plant" in said(pilot, "try-table") and "6 of 8 models kept" in said(pilot, "try-header")
+        assert "without bench, plant" in said(pilot, "try-table") and "6 of 8 models kept" in said(
+            pilot, "try-header"
+        )
         await without(pilot, "sign")
         assert "another failure" in said(pilot) and len(screen.attempt.held) == 6
         screen.query_one(WorldMap).select(["sign", "crate"])
         await pilot.pause()
         await pilot.press("o")
         await pilot.pause()
-        assert screen.attempt.held == ("sign", "crate") and "17 of 20 tests left" in said(pilot, "try-header")
+        assert screen.attempt.held == ("sign", "crate") and "17 of 20 tests left" in said(
+            pilot, "try-header"
+        )
         await pilot.press("m")
         assert not screen.attempt.ended and "Sure that no single one of 2 models" in said(pilot)
         await pilot.press("m")
@@ -78,7 +92,9 @@ async def test_a_wrong_claim_is_said_to_be_wrong_and_can_be_tried_again():
         assert not screen.attempt.tried, "nothing is marked"
         await without(pilot, "bin")
         await pilot.press("m", "escape")
-        assert pilot.app.screen is screen and "Sure" not in said(pilot), "escape takes back the claim, not the search"
+        assert pilot.app.screen is screen and "Sure" not in said(pilot), (
+            "escape takes back the claim, not the search"
+        )
         await pilot.press("m")
         assert not screen.attempt.ended, "the claim is asked for again"
         await pilot.press("m")
@@ -90,7 +106,9 @@ async def test_a_wrong_claim_is_said_to_be_wrong_and_can_be_tried_again():
         await without(pilot, "pallet")
         await pilot.press("u", "escape")
         await pilot.pause()
-        assert "`" not in said(pilot, "lesson-text") and "t continues it" in said(pilot, "lesson-text")
+        assert "`" not in said(pilot, "lesson-text") and "t continues it" in said(
+            pilot, "lesson-text"
+        )
         await pilot.press("t")
         await pilot.pause()
         assert [each.out for each in pilot.app.screen.attempt.tried] == [("pallet",)]

@@ -170,7 +170,10 @@ async def test_a_model_outside_the_view_comes_into_it(busy):
         await pilot.pause()
         assert world.go_to("crate_02")
         assert world.model_at_cursor == "crate_02"
-        assert world.viewport.view.cell(*world.place.prints[world._numbers["crate_02"]].center) == world.viewport.cursor
+        assert (
+            world.viewport.view.cell(*world.place.prints[world._numbers["crate_02"]].center)
+            == world.viewport.cursor
+        )
         assert not world.go_to("nothing")
 
 
@@ -188,7 +191,9 @@ async def test_a_click_selects_a_drag_pans_and_the_wheel_keeps_the_place_under_t
         assert world.viewport.view.x == pytest.approx(view.x - 4 * view.scale)
         assert world.viewport.view.y == pytest.approx(view.y + 2 * 2 * view.scale)
         before = world.viewport.view.point((3, 10))
-        world.post_message(MouseScrollUp(world, 10, 3, 0, 0, 0, False, False, False, screen_x=11, screen_y=4))
+        world.post_message(
+            MouseScrollUp(world, 10, 3, 0, 0, 0, False, False, False, screen_x=11, screen_y=4)
+        )
         await pilot.pause()
         assert world.viewport.view.scale < view.scale
         assert world.viewport.view.point((3, 10)) == pytest.approx(before)
@@ -208,7 +213,14 @@ async def test_a_place_is_picked_by_enter_or_click(busy):
         assert world.selection == frozenset()
 
 
-SIGNS = {"removed": "·", "pinned": "+", "path": "⠒", "failure": "×", "sensed": "A3", "participants": "b"}
+SIGNS = {
+    "removed": "·",
+    "pinned": "+",
+    "path": "⠒",
+    "failure": "×",
+    "sensed": "A3",
+    "participants": "b",
+}
 HIDDEN = ("sensed", "participants")
 
 
@@ -219,16 +231,27 @@ async def test_layers_are_shown_or_not(run, layer):
     async with Shown(run) as (pilot, world):
         state = world.snapshot.state
         sensed = tuple((f"crate_{number:02}", 5.0 - number) for number in range(3))
-        tests = [each if each.id != test else fake_sensed(state, each, sensed) for each in state.tests]
+        tests = [
+            each if each.id != test else fake_sensed(state, each, sensed) for each in state.tests
+        ]
         world.show(
-            Snapshot(state=state.changed(tests=type(state.tests).of(tests)), live=(), engine="absent", evidence=world.snapshot.evidence), None
+            Snapshot(
+                state=state.changed(tests=type(state.tests).of(tests)),
+                live=(),
+                engine="absent",
+                evidence=world.snapshot.evidence,
+            ),
+            None,
         )
         pilot.app.set_focus(None)
         await pilot.pause()
         seen = []
         for _ in range(2):
             text = text_of(world)
-            seen.append(SIGNS[layer] in text or (layer == "path" and any("⠀" < char <= "⣿" for char in text)))
+            seen.append(
+                SIGNS[layer] in text
+                or (layer == "path" and any("⠀" < char <= "⣿" for char in text))
+            )
             world.toggle_layer(layer)
         assert seen == [layer not in HIDDEN, layer in HIDDEN]
         world.toggle_layer("partitions")
@@ -272,7 +295,10 @@ async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):
         moved = type(world.snapshot.evidence)("d", world.snapshot.evidence)
         for index in range(2, len(moved), 8):
             moved[index] -= 2.0
-        world.show(Snapshot(state=world.snapshot.state, evidence=world.snapshot.evidence, original=moved), None)
+        world.show(
+            Snapshot(state=world.snapshot.state, evidence=world.snapshot.evidence, original=moved),
+            None,
+        )
         new = world.picture.canvas.chars[(world.picture.canvas.chars != before)]
         assert (new > 0x2800).any()
         assert "path of f" in legend(world.shown, 100).plain
@@ -287,7 +313,9 @@ async def test_only_the_rows_of_the_robot_are_drawn_when_only_it_moves(busy, mon
         snapshot = world.snapshot
         first, second = snapshot.live
         x, y, *rest = first.pose
-        moved = Live(slot=first.slot, test=first.test, time=first.time + 0.1, pose=(x + 0.3, y, *rest))
+        moved = Live(
+            slot=first.slot, test=first.test, time=first.time + 0.1, pose=(x + 0.3, y, *rest)
+        )
         world.show(replace(snapshot, live=(moved, second)), None)
         assert 1 <= len(regions) <= 2
 
@@ -303,7 +331,9 @@ async def test_a_model_that_a_running_test_moves_moves_on_the_map(busy):
 
         def at(models):
             world.show(replace(snapshot, live=(replace(first, models=models), *others)), None)
-            return world.picture.cells.get([each.name for each in place.prints].index(name)), text_of(world)
+            return world.picture.cells.get(
+                [each.name for each in place.prints].index(name)
+            ), text_of(world)
 
         still = at({})
         moved = at({name: (x + 3.0, y, z, 1.0, 0.0, 0.0, 0.0), "unknown": (0.0,) * 7})
@@ -323,7 +353,11 @@ async def test_words_about_a_model(busy):
 
 async def test_strange_names_are_one_harmless_line(runs):
     name = "[red]\u202e\u05d0\u05d1" + "x" * 300
-    run = fake_run.FakeRun(runs / "x.ddenv", world=fake_run.world_text([name, "other"])).created().baseline()
+    run = (
+        fake_run.FakeRun(runs / "x.ddenv", world=fake_run.world_text([name, "other"]))
+        .created()
+        .baseline()
+    )
     async with Shown(run) as (pilot, world):
         world.go_to(run.elements[0])
         await pilot.pause()
@@ -338,7 +372,14 @@ async def test_strange_names_are_one_harmless_line(runs):
 async def test_worlds_of_few_models(count):
     prints = tuple(Footprint(f"m{number}", (), (1.0, 1.0), (1.0, 1.0)) for number in range(count))
     async with Shown() as (pilot, world):
-        world.set_place(Place(prints=prints, spawn=(0.0, 0.0, 0.0), goal=(3.0, 0.0), elements=frozenset(each.name for each in prints)))
+        world.set_place(
+            Place(
+                prints=prints,
+                spawn=(0.0, 0.0, 0.0),
+                goal=(3.0, 0.0),
+                elements=frozenset(each.name for each in prints),
+            )
+        )
         await pilot.press("]", "enter", "up", "plus")
         text = text_of(world)
         assert "S" in text
@@ -350,10 +391,21 @@ async def test_worlds_of_few_models(count):
 
 @pytest.mark.parametrize("reach", [10, 200])
 async def test_two_ways_fill_the_map_of_a_large_world(reach):
-    prints = tuple(Footprint(f"m{x}", (), (x, 0.0), (x + 1.0, 1.0)) for x in range(-reach, reach, 5))
-    ways = tuple(Way(name, np.linspace((0, 0), (6, y), 20)) for name, y in (("with", 0.5), ("without", -0.5)))
+    prints = tuple(
+        Footprint(f"m{x}", (), (x, 0.0), (x + 1.0, 1.0)) for x in range(-reach, reach, 5)
+    )
+    ways = tuple(
+        Way(name, np.linspace((0, 0), (6, y), 20)) for name, y in (("with", 0.5), ("without", -0.5))
+    )
     async with Shown() as (pilot, world):
-        world.set_place(Place(prints=prints, spawn=(0.0, 0.0, 0.0), goal=(6.0, 0.0), elements=frozenset(each.name for each in prints)))
+        world.set_place(
+            Place(
+                prints=prints,
+                spawn=(0.0, 0.0, 0.0),
+                goal=(6.0, 0.0),
+                elements=frozenset(each.name for each in prints),
+            )
+        )
         world.show_ways(ways, None, None, world.place.prints)
         await pilot.pause()
         view = world.viewport.view

@@ -7,7 +7,17 @@ from ddenv.map.colors import HUES, PLAIN, luminance, packed
 from ddenv.map.footprints import Footprint
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import View, masks, owners
-from ddenv.workbench.map.map_colors import FLOOR, KEPT, LEFT_OUT, OWN, PINNED, PROTECTED, REMOVED, SELECTED, mixed
+from ddenv.workbench.map.map_colors import (
+    FLOOR,
+    KEPT,
+    LEFT_OUT,
+    OWN,
+    PINNED,
+    PROTECTED,
+    REMOVED,
+    SELECTED,
+    mixed,
+)
 from ddenv.workbench.map.model_looks import GONE, Kept, fill, ghosts, looks
 
 DARK, LIGHT = ((15, 20, 27), (213, 219, 229)), ((250, 250, 250), (30, 30, 30))
@@ -42,7 +52,12 @@ def test_parts_look_different_from_each_other_from_the_background_and_from_what_
     palette = PALETTES[name]
     tones = [palette.tone(KEPT, part) for part in range(len(HUES))]
     assert len({tone.fill for tone in tones}) == len(HUES)
-    assert tones[0] != palette.tone(LEFT_OUT, 0) != palette.tone(SELECTED, 0) != palette.tone(PINNED, 0)
+    assert (
+        tones[0]
+        != palette.tone(LEFT_OUT, 0)
+        != palette.tone(SELECTED, 0)
+        != palette.tone(PINNED, 0)
+    )
     for part, tone in enumerate(tones):
         fills = tone.fill, palette.tone(LEFT_OUT, part).fill
         kept, out = (abs(luminance(fill) - luminance(packed(palette.ground))) for fill in fills)
@@ -57,7 +72,9 @@ def test_kinds_of_models_differ_without_colours_too():
 @pytest.mark.parametrize("name", PALETTES)
 def test_neighbours_of_one_part_have_a_border(name):
     prints = squares(4)
-    canvas, _ = drawn(prints, who_of(prints, dict.fromkeys(("m0", "m1", "m2", "m3"), 0)), PALETTES[name])
+    canvas, _ = drawn(
+        prints, who_of(prints, dict.fromkeys(("m0", "m1", "m2", "m3"), 0)), PALETTES[name]
+    )
     row = canvas.text(VIEW.rows // 2)
     borders = [column for column, char in enumerate(row) if char == "▉"]
     assert borders == [1, 3, 5]
@@ -76,12 +93,18 @@ def test_a_terminals_own_colour_is_never_in_a_block():
 @pytest.mark.parametrize("name", PALETTES)
 def test_dots_of_removed_models_leave_the_floor_around_them_whole(name):
     palette = PALETTES[name]
-    floor = Footprint("floor", (np.array([(-5, -1.25), (5, -1.25), (5, 1.25), (-5, 1.25)]),), (-5, -1.25), (5, 1.25))
+    floor = Footprint(
+        "floor",
+        (np.array([(-5, -1.25), (5, -1.25), (5, 1.25), (-5, 1.25)]),),
+        (-5, -1.25),
+        (5, 1.25),
+    )
     prints = [floor, *squares(3, 0.5)]
     names = frozenset(each.name for each in prints)
     how = looks(prints, Kept(elements=names, environment=frozenset({"floor"})), palette)
     grids = [
-        owners(masks(prints, VIEW), VIEW, np.flatnonzero(one)) for one in (how.kinds == REMOVED, how.kinds == FLOOR)
+        owners(masks(prints, VIEW), VIEW, np.flatnonzero(one))
+        for one in (how.kinds == REMOVED, how.kinds == FLOOR)
     ]
     canvas = Canvas(VIEW.rows, VIEW.columns, palette.back)
     fill(canvas, grids[1], how)
@@ -92,7 +115,10 @@ def test_dots_of_removed_models_leave_the_floor_around_them_whole(name):
 
 
 SIGNS = (
-    ({"parts": {"m0": 0, "m2": 1}, "pinned": frozenset({"m1"}), "selected": frozenset({"m2"})}, ["A", "+", "*B"]),
+    (
+        {"parts": {"m0": 0, "m2": 1}, "pinned": frozenset({"m1"}), "selected": frozenset({"m2"})},
+        ["A", "+", "*B"],
+    ),
     # Numbers of the order of sensing follow the letters.
     ({"parts": {"m0": 0, "m1": 0, "m2": 1}, "sensed": {"m2": 1, "m0": 12}}, ["A12", "A", "B1"]),
     ({"dropped": frozenset({"m1"})}, ["", "↓", ""]),

@@ -23,7 +23,12 @@ def robots(screen):
     """The signs of the robots on the map, and their cells."""
     text = [screen.map._canvas.text(row) for row in range(screen.map.size.height)]
     signs = ARROWS + HOLLOW
-    return {(char, (y, x)) for y, line in enumerate(text) for x, char in enumerate(line) if char in signs}
+    return {
+        (char, (y, x))
+        for y, line in enumerate(text)
+        for x, char in enumerate(line)
+        if char in signs
+    }
 
 
 async def settled(session):
@@ -59,7 +64,9 @@ async def test_the_row_under_the_cursor_is_played_and_the_robot_moves(two_ways):
         assert (first.without, second.without, first.seed) == (None, "crate_00", second.seed)
 
 
-async def test_time_goes_on_by_the_clock_at_the_chosen_speed_and_stops_at_the_end(two_ways, monkeypatch):
+async def test_time_goes_on_by_the_clock_at_the_chosen_speed_and_stops_at_the_end(
+    two_ways, monkeypatch
+):
     clock = [0.0]
     monkeypatch.setattr(playback_screen, "now", lambda: clock[0])
     async with Attached(two_ways) as session:
@@ -69,7 +76,9 @@ async def test_time_goes_on_by_the_clock_at_the_chosen_speed_and_stops_at_the_en
         clock[0] = 3.0
         screen._tick()
         assert screen.playing.time == pytest.approx(3.0)
-        assert "▶ 3.0 s of 45.0 s · 1 × real time" in str(screen.query_one("#playback-time").border_title)
+        assert "▶ 3.0 s of 45.0 s · 1 × real time" in str(
+            screen.query_one("#playback-time").border_title
+        )
         await session.press("greater_than_sign")
         clock[0] = 13.0
         screen._tick()
@@ -169,7 +178,9 @@ async def test_models_move_where_their_motion_is_stored(runs):
         session.app.screen.opening.play_row(run.state.tests[0])
         screen = await settled(session)
         assert "1 model that moved" in str(screen.query_one("#playback-world").border_title)
-        centre = lambda: next(each.center for each in screen.map.place.prints if each.name == "crate_03")  # noqa: E731
+        centre = lambda: next(
+            each.center for each in screen.map.place.prints if each.name == "crate_03"
+        )  # noqa: E731
         await session.press("right")
         assert centre() == pytest.approx((-1.8, -2.0))
         await session.press("end")

@@ -61,7 +61,8 @@ class Listed:
     def rows(self):
         table = self.table
         return {
-            str(row[0]): [str(cell) for cell in row] for row in (table.get_row_at(i) for i in range(table.row_count))
+            str(row[0]): [str(cell) for cell in row]
+            for row in (table.get_row_at(i) for i in range(table.row_count))
         }
 
     async def choose(self, stem):
@@ -116,7 +117,8 @@ async def test_every_run_says_how_it_stands(several, runs):
 
 async def test_while_runs_are_first_read_a_cursor_that_nobody_moved_stays_at_the_newest_run():
     copied, new, old = (
-        Recent(path=Path(f"{name}.ddenv"), changed=changed) for name, changed in (("a", 9.0), ("b", 8.0), ("c", 7.0))
+        Recent(path=Path(f"{name}.ddenv"), changed=changed)
+        for name, changed in (("a", 9.0), ("b", 8.0), ("c", 7.0))
     )
     app = App()
     async with app.run_test() as pilot:
@@ -247,7 +249,8 @@ async def test_two_runs_are_compared(several, runs):
 
 
 @pytest.mark.parametrize(
-    "how", slow(pytest.mark.screens, ["typed", "completed", "pasted", "quoted", "url"], but=["pasted"])
+    "how",
+    slow(pytest.mark.screens, ["typed", "completed", "pasted", "quoted", "url"], but=["pasted"]),
 )
 async def test_a_run_of_elsewhere_is_opened_by_its_path(run, tmp_path, how):
     folder = tmp_path / "from a robot"
@@ -289,7 +292,10 @@ async def test_slash_filters_and_escape_goes_back(several):
         await listed.press("escape")
         assert len(listed.rows()) == 5 and listed.app.screen.query_one("#filter", Input).value == ""
         await listed.press("slash", "enter")
-        assert not listed.app.screen.query_one("#filter").display and listed.app.focused is listed.table
+        assert (
+            not listed.app.screen.query_one("#filter").display
+            and listed.app.focused is listed.table
+        )
         await listed.press("escape")
         assert isinstance(listed.app.screen, RunScreen)
 
@@ -308,7 +314,9 @@ def test_only_files_that_changed_are_read_again(several, runs, monkeypatch):
     folder = RunsFolder(runs)
     first = folder.look()
     opened = []
-    monkeypatch.setattr("ddenv.workbench.shared.observed.Observed", lambda path: opened.append(path))
+    monkeypatch.setattr(
+        "ddenv.workbench.shared.observed.Observed", lambda path: opened.append(path)
+    )
     assert folder.look() == first and opened == []
     # A look without time tells the names.
     assert {run.status for run in RunsFolder(runs).look(patience=-1.0)} == {""}

@@ -86,7 +86,14 @@ class Session:
 
     async def place(self, **others):
         """A start and a goal in an empty place."""
-        places = {"spawn_x": "-6", "spawn_y": "0", "spawn_z": "0.16", "yaw": "0", "goal_x": "6", "goal_y": "0"}
+        places = {
+            "spawn_x": "-6",
+            "spawn_y": "0",
+            "spawn_z": "0.16",
+            "yaw": "0",
+            "goal_x": "6",
+            "goal_y": "0",
+        }
         await self.filled(**places | others)
 
     def refused(self):

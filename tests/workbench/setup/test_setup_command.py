@@ -90,7 +90,9 @@ def test_a_long_number_is_shown_rounded_and_stays_what_it_is(scenarios, own, ask
     asked = form.asked_of(own, texts, own.reduction.pair, own.reduction.algorithm)
     assert asked.reduction.certify_rate == own.reduction.certify_rate == 2 / 3
     assert told(scenarios / "crates.yaml", own, asked)[3:] == []
-    asked = form.asked_of(own, texts | {"certify_rate": "0.66"}, own.reduction.pair, own.reduction.algorithm)
+    asked = form.asked_of(
+        own, texts | {"certify_rate": "0.66"}, own.reduction.pair, own.reduction.algorithm
+    )
     assert asked.reduction.certify_rate == 0.66
 
 
@@ -107,11 +109,20 @@ async def test_what_is_shown_starts_what_start_starts(scenarios, asked_by, start
     async with Opened() as session:
         assert session.told("command") == "$ ddenv run crates"
         await session.press("f9")
-        session.fill(iterations="5", as_printed="on", spawn_x="-6.25", goal_y="-0.5", jobs="2", run_name="mine")
+        session.fill(
+            iterations="5",
+            as_printed="on",
+            spawn_x="-6.25",
+            goal_y="-0.5",
+            jobs="2",
+            run_name="mine",
+        )
         session.screen.query_one("#algorithm").value = "ddmin"
         await session.pilot.pause()
         shown = session.told("command").removeprefix("$ ")
-        assert shown.startswith("ddenv run crates --spawn=-6.25,0,0.2,0 --goal=6,-0.5 --algorithm ddmin --iterations 5")
+        assert shown.startswith(
+            "ddenv run crates --spawn=-6.25,0,0.2,0 --goal=6,-0.5 --algorithm ddmin --iterations 5"
+        )
         assert shown.endswith("--as-printed --jobs 2 --name mine")
         await session.press("f8")
         assert session.app.clipboard == shown
@@ -144,10 +155,14 @@ async def test_a_bare_world_and_how_it_is_read_are_part_of_it(scenarios, tmp_pat
     folder.mkdir()
     path = folder / "it's.sdf"
     path.write_bytes((scenarios / "crates.sdf").read_bytes())
-    async with Opened(reading={"stand_in": ("model://barrel=cylinder:0.3,1",), "model_path": (folder,)}) as session:
+    async with Opened(
+        reading={"stand_in": ("model://barrel=cylinder:0.3,1",), "model_path": (folder,)}
+    ) as session:
         await session.open(path)
         assert session.told("command") == ""
-        assert "not ready: spawn x m, spawn y m, spawn z m, yaw rad: missing" in session.told("cost")
+        assert "not ready: spawn x m, spawn y m, spawn z m, yaw rad: missing" in session.told(
+            "cost"
+        )
         await session.press("f8")
         assert session.app.clipboard == "" and session.app.focused.id == "spawn_x"
         await session.place()

@@ -26,7 +26,10 @@ def test_tests_and_time_are_told():
     known = Past(3.0, 0.9)
     words = whole_cost(scenario(), 43, 2, known)
     assert words.startswith("about ")
-    assert "tests (35 to 250): 4 for the baseline, 35 for the search, 50 for the certificate; " in words
+    assert (
+        "tests (35 to 250): 4 for the baseline, 35 for the search, 50 for the certificate; "
+        in words
+    )
     assert words.endswith("with 2 jobs at 3.0 s a test, as before")
     unknown = whole_cost(scenario(), 43, 2, Past())
     parts = "4 for the baseline, 35 for the search, 50 for the certificate"

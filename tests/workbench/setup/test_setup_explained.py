@@ -33,17 +33,30 @@ async def test_what_is_focused_highlighted_or_changed_is_explained(scenarios):
         assert session.explained() == ("algorithm ddenv", explanation("algorithm", "ddenv"))
         await session.press("enter", "tab")
         assert session.app.focused.id == "partitioning"
-        assert session.explained() == ("partitioning model2model", explanation("partitioning", "model2model"))
+        assert session.explained() == (
+            "partitioning model2model",
+            explanation("partitioning", "model2model"),
+        )
         await session.press("enter", "down")
-        assert session.explained()[0] == "partitioning model2model", "an open list belongs to its field"
+        assert session.explained()[0] == "partitioning model2model", (
+            "an open list belongs to its field"
+        )
         await session.press("enter")
-        assert session.explained() == ("partitioning timeseg", explanation("partitioning", "timeseg"))
+        assert session.explained() == (
+            "partitioning timeseg",
+            explanation("partitioning", "timeseg"),
+        )
         session.screen.query_one("#prioritization", Select).value = "random"
         await session.pilot.pause()
-        assert session.explained() == ("prioritization random", explanation("prioritization", "random"))
+        assert session.explained() == (
+            "prioritization random",
+            explanation("prioritization", "random"),
+        )
         session.screen.query_one("#iterations").focus()
         await session.pilot.pause()
-        assert session.explained()[0] == "iterations" and session.explained()[1].endswith(SETTINGS["iterations"].cost)
+        assert session.explained()[0] == "iterations" and session.explained()[1].endswith(
+            SETTINGS["iterations"].cost
+        )
         # Another scenario brings its own.
         await session.press("f2", "down")
         assert session.explained()[0] == "algorithm probdd"
@@ -52,8 +65,16 @@ async def test_what_is_focused_highlighted_or_changed_is_explained(scenarios):
 UNUSED = {
     "ddenv": ([], "", ""),
     "splitting": (["partitioning"], "does not use the partitioning", "Not used by splitting"),
-    "ddmin": (["partitioning", "prioritization"], "uses neither the partitioning", "Not used by ddmin"),
-    "probdd": (["partitioning", "prioritization"], "uses neither the partitioning", "Not used by probdd"),
+    "ddmin": (
+        ["partitioning", "prioritization"],
+        "uses neither the partitioning",
+        "Not used by ddmin",
+    ),
+    "probdd": (
+        ["partitioning", "prioritization"],
+        "uses neither the partitioning",
+        "Not used by probdd",
+    ),
 }
 
 
@@ -65,10 +86,14 @@ async def test_what_the_algorithm_does_not_use_is_dimmed_and_said(scenarios):
             session.screen.query_one("#algorithm", Select).value = algorithm
             await session.pilot.pause()
             assert words in session.explained()[1]
-            assert [kind for kind in KINDS if session.screen.query_one(f"#{kind}").has_class("-unused")] == unused
+            assert [
+                kind for kind in KINDS if session.screen.query_one(f"#{kind}").has_class("-unused")
+            ] == unused
             session.screen.query_one("#partitioning").focus()
             await session.pilot.pause()
-            assert session.explained()[1].startswith(beside or explanation("partitioning", "model2model"))
+            assert session.explained()[1].startswith(
+                beside or explanation("partitioning", "model2model")
+            )
 
 
 @pytest.mark.screens

@@ -22,7 +22,9 @@ async def test_the_baseline_pauses_after_itself(scenarios, runs, started):
         assert session.wrong_or_run() == "crates-1"
         assert started == [("crates-1.ddenv", 3, {"accept_mode": "automatic", "attended": "yes"})]
         with RunFile(runs / "crates-1.ddenv") as run:
-            assert [(command.kind, command.data) for command in run.commands()] == [("step", {"unit": "round"})]
+            assert [(command.kind, command.data) for command in run.commands()] == [
+                ("step", {"unit": "round"})
+            ]
 
 
 @pytest.mark.screens
@@ -40,12 +42,18 @@ async def test_worlds_with_little_in_them(scenarios, runs, started, models, told
     async with Opened() as session:
         assert session.told("about").startswith(told)
         await session.press("ctrl+s")
-        assert session.wrong_or_run() == "crates-1" if models else "has no model that can be removed" in session.wrong()
+        assert (
+            session.wrong_or_run() == "crates-1"
+            if models
+            else "has no model that can be removed" in session.wrong()
+        )
         assert len(started) == bool(models)
 
 
 @pytest.mark.screens
-async def test_a_folder_that_cannot_be_written_is_told_in_one_line(scenarios, tmp_path, monkeypatch, started):
+async def test_a_folder_that_cannot_be_written_is_told_in_one_line(
+    scenarios, tmp_path, monkeypatch, started
+):
     (tmp_path / "file").touch()
     monkeypatch.setenv("DDENV_HOME", str(tmp_path / "file"))
     async with Opened() as session:
@@ -59,7 +67,9 @@ async def test_a_folder_that_cannot_be_written_is_told_in_one_line(scenarios, tm
 
 async def test_strange_names_are_shown_as_text_and_steer_nothing(scenarios, runs, started):
     write_scenario(scenarios, name="[red]" + "ß" * 70, description=STRANGE)
-    (scenarios / "crates.sdf").write_bytes(fake_run.world_text([STRANGE.replace("\x1b", "").strip("[]"), "b"]))
+    (scenarios / "crates.sdf").write_bytes(
+        fake_run.world_text([STRANGE.replace("\x1b", "").strip("[]"), "b"])
+    )
     async with Opened((80, 24)) as session:
         assert "[bold]x[/] �[31m" in session.screen.preview.choice.about
         assert str(session.screen.query_one("#preview").border_title).startswith("\\[red]ß")
@@ -89,10 +99,14 @@ async def test_names_that_cannot_be_files_are_told(scenarios, run, started):
         assert started == []
 
 
-@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(20, 5), (63, 40), (200, 17)], but=[(63, 40)]), ids=str)
+@pytest.mark.parametrize(
+    "size", slow(pytest.mark.screens, [(20, 5), (63, 40), (200, 17)], but=[(63, 40)]), ids=str
+)
 async def test_a_terminal_that_is_too_small_is_told_what_is_needed(scenarios, size):
     async with Opened(size) as session:
-        assert session.told("small") == f"ddenv needs 64 x 18; this terminal has {size[0]} x {size[1]}"
+        assert (
+            session.told("small") == f"ddenv needs 64 x 18; this terminal has {size[0]} x {size[1]}"
+        )
         await eventually(lambda: session.screen.query_one("#small").region.size == size)
         await session.pilot.resize_terminal(120, 36)
         await session.pilot.pause()
@@ -106,13 +120,25 @@ async def test_what_is_typed_right_after_tab_goes_to_the_next_field(scenarios):
         await session.pilot.pause()
         before = session.value("epsilon")
         # At once, as they come from a busy terminal.
-        for key, character in (("tab", None), ("3", "3"), ("tab", None), ("minus", "-"), ("1", "1")):
+        for key, character in (
+            ("tab", None),
+            ("3", "3"),
+            ("tab", None),
+            ("minus", "-"),
+            ("1", "1"),
+        ):
             session.app.post_message(events.Key(key, character))
         await session.settle()
         assert [session.value(id) for id in ("epsilon", "jobs", "spawn_x")] == [before, "3", "-1"]
 
 
-NUMBERS = {"spawn_x": "-0.56", "spawn_y": "6.75", "yaw": "-1.571", "goal_x": "-12.05", "goal_y": "-104.5"}
+NUMBERS = {
+    "spawn_x": "-0.56",
+    "spawn_y": "6.75",
+    "yaw": "-1.571",
+    "goal_x": "-12.05",
+    "goal_y": "-104.5",
+}
 
 
 def shown(session, id):
@@ -141,7 +167,9 @@ async def test_a_number_that_does_not_fit_says_so_and_is_replaced_by_typing(scen
     async with Opened() as session:
         await session.press("f4")
         await session.filled(spawn_x="-0.78539816339")
-        assert shown(session, "spawn_x").startswith("-0.78") and shown(session, "spawn_x").endswith("…")
+        assert shown(session, "spawn_x").startswith("-0.78") and shown(session, "spawn_x").endswith(
+            "…"
+        )
         session.screen.query_one("#spawn_x").focus()
         await session.pilot.pause()
         assert shown(session, "spawn_x").startswith("-0.78")

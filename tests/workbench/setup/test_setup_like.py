@@ -45,7 +45,9 @@ async def test_it_starts_from_the_run_file_alone(made, runs, started):
 
 
 @pytest.mark.screens
-async def test_what_is_gone_cannot_be_saved_and_what_is_damaged_not_be_shown(made, runs, tmp_path, monkeypatch):
+async def test_what_is_gone_cannot_be_saved_and_what_is_damaged_not_be_shown(
+    made, runs, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     async with Opened(screen=lambda: SetupScreen(like=made)) as session:
         await session.press("f7")
@@ -57,7 +59,9 @@ async def test_what_is_gone_cannot_be_saved_and_what_is_damaged_not_be_shown(mad
 
 
 @pytest.mark.screens
-async def test_what_is_still_there_has_a_command_once_it_is_saved(scenarios, runs, tmp_path, monkeypatch):
+async def test_what_is_still_there_has_a_command_once_it_is_saved(
+    scenarios, runs, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     path = runs / "crates-1.ddenv"
     create_run(load_scenario(scenarios / "crates.yaml"), path)
@@ -94,7 +98,10 @@ def same(one, other):
 
     def told(scenario):
         data = scenario.model_dump()
-        data["world"], data["robot"]["model"] = scenario.world.resolve(), scenario.robot.model.resolve()
+        data["world"], data["robot"]["model"] = (
+            scenario.world.resolve(),
+            scenario.robot.model.resolve(),
+        )
         return data | {"folder": None}
 
     return told(one) == told(other)
@@ -115,12 +122,18 @@ def test_a_name_gets_its_ending_and_must_be_possible(tmp_path, monkeypatch):
     assert scenario_path(" mine ") == Path("mine.yaml")
     assert scenario_path("v1.2") == Path("v1.2.yaml")
     assert scenario_path("a.yml") == Path("a.yml")
-    for text, words in ((" ", "give the name"), ("no/such/x", "there is no folder"), ("\0", "give the name")):
+    for text, words in (
+        (" ", "give the name"),
+        ("no/such/x", "there is no folder"),
+        ("\0", "give the name"),
+    ):
         with pytest.raises(UserError, match=words):
             scenario_path(text)
 
 
-async def test_the_key_asks_for_a_name_and_never_overwrites_unasked(scenarios, tmp_path, monkeypatch):
+async def test_the_key_asks_for_a_name_and_never_overwrites_unasked(
+    scenarios, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     taken = tmp_path / "taken.yaml"
     taken.write_text("mine\n")

@@ -123,9 +123,14 @@ async def test_elements_that_are_not_supported_are_left_out_once_the_user_says_s
             "? <joint>",
             "? <image>",
         ]
-        assert "2 missing files, 2 unsupported elements without a remedy: press m" in session.told("cost")
+        assert "2 missing files, 2 unsupported elements without a remedy: press m" in session.told(
+            "cost"
+        )
         await session.press("m", "home", "down", "down", "enter")
-        assert rows(session)[2:] == ["✓ <joint>  not supported, left out", "? <image>  not supported, left out"]
+        assert rows(session)[2:] == [
+            "✓ <joint>  not supported, left out",
+            "? <image>  not supported, left out",
+        ]
         await session.press("m", "a")
         assert [row[0] for row in rows(session)] == ["✓"] * 4
         await session.place(spawn_x="0", goal_x="8")
@@ -137,7 +142,9 @@ async def test_elements_that_are_not_supported_are_left_out_once_the_user_says_s
         assert [row[0] for row in rows(session)] == ["✓", "✓", "?", "?"]
 
 
-async def test_files_that_were_found_and_cannot_be_used_say_why_and_have_the_same_remedies(tmp_path):
+async def test_files_that_were_found_and_cannot_be_used_say_why_and_have_the_same_remedies(
+    tmp_path,
+):
     (tmp_path / "barrel.dae").write_text("<COLLADA><")
     models = tmp_path / "models"
     for name, content in {
@@ -145,7 +152,9 @@ async def test_files_that_were_found_and_cannot_be_used_say_why_and_have_the_sam
         "keg": barrel("keg", 2).replace(BARREL, "keg.dae"),
     }.items():
         (models / name).mkdir(parents=True)
-        (models / name / "model.sdf").write_text(content if name == "rack" else f"<sdf version='1.6'>{content}</sdf>")
+        (models / name / "model.sdf").write_text(
+            content if name == "rack" else f"<sdf version='1.6'>{content}</sdf>"
+        )
     (models / "keg" / "keg.dae").write_text("<COLLADA><")
     includes = "".join(f"<include><uri>model://{name}</uri></include>" for name in ("rack", "keg"))
     inside = f"{includes}{barrel('one', 2).replace(BARREL, 'barrel.dae')}"
@@ -153,7 +162,10 @@ async def test_files_that_were_found_and_cannot_be_used_say_why_and_have_the_sam
     path.write_text(f"<sdf version='1.6'><world name='w'>{inside}</world></sdf>")
     async with Opened(size=(120, 36)) as session:
         await session.open(path)
-        assert session.screen.query_one(MissingList).border_title == "3 unreadable files (m), 3 without a remedy"
+        assert (
+            session.screen.query_one(MissingList).border_title
+            == "3 unreadable files (m), 3 without a remedy"
+        )
         rack, *meshes = rows(session)
         assert rack.startswith(f"? rack  {models}/rack/model.sdf:1:20: not well-formed XML: ")
         assert [row.partition(": ")[0] for row in meshes] == [
@@ -167,12 +179,12 @@ async def test_files_that_were_found_and_cannot_be_used_say_why_and_have_the_sam
         assert session.screen.preview.choice.world.names == ("keg", "one")
 
 
-CRATE = (
-    f"<model name='crate'><static>1</static><link name='l'>{collision('<box><size>2 1 1</size></box>')}</link></model>"
+CRATE = f"<model name='crate'><static>1</static><link name='l'>{collision('<box><size>2 1 1</size></box>')}</link></model>"
+
+
+@pytest.mark.filterwarnings(
+    "ignore:Exception in thread:pytest.PytestUnhandledThreadExceptionWarning"
 )
-
-
-@pytest.mark.filterwarnings("ignore:Exception in thread:pytest.PytestUnhandledThreadExceptionWarning")
 async def test_models_come_from_fuel_unless_the_user_stops_that(depot, tmp_path, monkeypatch):
     for variable in CACHES:
         monkeypatch.delenv(variable, raising=False)
@@ -297,7 +309,9 @@ async def test_what_was_replaced_or_ignored_can_be_read(tmp_path):
         </sphere></geometry><surface><bounce><restitution_coefficient>1</restitution_coefficient></bounce></surface>
         </collision></link></model>"""
     path = tmp_path / "balls.world"
-    path.write_text(f"<sdf version='1.6'><world name='w'>{ball.format('one')}{ball.format('two')}</world></sdf>")
+    path.write_text(
+        f"<sdf version='1.6'><world name='w'>{ball.format('one')}{ball.format('two')}</world></sdf>"
+    )
     async with Opened(size=(80, 24)) as session:
         await session.open(path)
         found = session.screen.query_one(MissingList)
@@ -306,9 +320,12 @@ async def test_what_was_replaced_or_ignored_can_be_read(tmp_path):
         assert found.size.height == 2
         shown = [option.prompt.plain for option in found.options]
         assert any(
-            row.startswith("  ignored <restitution_coefficient> × 2  bouncing is not simulated") for row in shown
+            row.startswith("  ignored <restitution_coefficient> × 2  bouncing is not simulated")
+            for row in shown
         )
-        assert not {"guess", "without"} & {each.binding.action for each in session.screen.active_bindings.values()}
+        assert not {"guess", "without"} & {
+            each.binding.action for each in session.screen.active_bindings.values()
+        }
         await session.press("enter", "a", "w")
         assert remembered() == {}
 
@@ -338,12 +355,24 @@ def test_commands_use_what_the_workbench_remembers_and_say_so(depot, monkeypatch
     done = in_process(monkeypatch, capsys, "world", "check", depot)
     assert done.returncode == 0
     assert BARREL in done.stderr and "--no-remembered" in done.stderr
-    is_one_line(in_process(monkeypatch, capsys, "world", "check", depot, "--no-remembered"), "construction_barrel")
-    given = {"model_path": (), "stand_in": (), "ignore": (), "spawn": (0, 0, 0.2, 0), "goal": (9, 0), "world": None}
+    is_one_line(
+        in_process(monkeypatch, capsys, "world", "check", depot, "--no-remembered"),
+        "construction_barrel",
+    )
+    given = {
+        "model_path": (),
+        "stand_in": (),
+        "ignore": (),
+        "spawn": (0, 0, 0.2, 0),
+        "goal": (9, 0),
+        "world": None,
+    }
     said = []
     world, _ = load_parts(scenario_named(str(depot), {**given, "remembered": True}, said.append))
     assert {model.name for model in world.models if model.name in ("one", "two")} == {"one", "two"}
-    assert all(name in said[-1] for name in (BARREL, SHELF, str(state_file(REMEDIES)), "--no-remembered"))
+    assert all(
+        name in said[-1] for name in (BARREL, SHELF, str(state_file(REMEDIES)), "--no-remembered")
+    )
     assert "another" not in said[-1]
     with pytest.raises(UserError, match="construction_barrel"):
         load_parts(scenario_named(str(depot), {**given, "remembered": False}))

@@ -85,7 +85,9 @@ async def test_the_robot_is_put_on_what_stands_there(scenarios):
         assert (session.value("spawn_x"), session.value("spawn_z")) == ("50", "0.25")
 
 
-@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (80, 24)], but=[(80, 24)]), ids=str)
+@pytest.mark.parametrize(
+    "size", slow(pytest.mark.screens, [(120, 36), (80, 24)], but=[(80, 24)]), ids=str
+)
 async def test_a_bare_world_asks_for_all_three_in_turn(scenarios, tmp_path, size):
     path = tmp_path / "bare.sdf"
     path.write_bytes((scenarios / "crates.sdf").read_bytes())
@@ -98,7 +100,11 @@ async def test_a_bare_world_asks_for_all_three_in_turn(scenarios, tmp_path, size
         before = places.map.viewport.cursor
         await session.press("up")
         assert places.map.viewport.cursor != before
-        for place, words in (((-6, 0), "the heading"), ((0, 0), "the goal"), ((6, 1), "start (-6.00, 0.00) m")):
+        for place, words in (
+            ((-6, 0), "the heading"),
+            ((0, 0), "the goal"),
+            ((6, 1), "start (-6.00, 0.00) m"),
+        ):
             await places.pick(*place)
             assert words in places.says()
         assert float(session.value("spawn_z")) == pytest.approx(0.167, abs=0.005)
@@ -106,7 +112,9 @@ async def test_a_bare_world_asks_for_all_three_in_turn(scenarios, tmp_path, size
 
 
 @pytest.mark.screens
-async def test_the_ground_gives_the_z_of_a_start_that_is_typed_until_one_types_that(scenarios, tmp_path):
+async def test_the_ground_gives_the_z_of_a_start_that_is_typed_until_one_types_that(
+    scenarios, tmp_path
+):
     path = tmp_path / "bare.sdf"
     path.write_bytes((scenarios / "crates.sdf").read_bytes())
     async with Opened() as session:
@@ -171,7 +179,9 @@ def world(*models):
 
 async def says(session, words):
     line = session.screen.query_one("#start-notes")
-    await eventually(lambda: line.display == bool(words) and (not words or line.render().plain == words))
+    await eventually(
+        lambda: line.display == bool(words) and (not words or line.render().plain == words)
+    )
     return line
 
 
@@ -186,7 +196,10 @@ async def test_a_robot_in_the_air_is_told_until_its_start_is_lower(scenarios, si
         assert line.tooltip.plain == f"{what}; lower the spawn's z."
         await session.press("f3")
         # Where the map is alone, the note is whole.
-        assert line.region.height == (2 if size[0] == 80 else 1) and session.screen.query_one("#map").region.height > 10
+        assert (
+            line.region.height == (2 if size[0] == 80 else 1)
+            and session.screen.query_one("#map").region.height > 10
+        )
         session.fill(spawn_z="0.2")
         await says(session, "")
 
@@ -200,7 +213,8 @@ async def test_models_inside_each_other_are_told_of_a_world_without_a_start(scen
         await says(session, f"▲ move one model, or make both static: {why}")
         session.fill(spawn_x="4", spawn_y="0", spawn_z="2", yaw="0")
         line = await says(
-            session, "▲ lower the spawn's z (+1): the robot starts 1.87 m above the surface below it and drops"
+            session,
+            "▲ lower the spawn's z (+1): the robot starts 1.87 m above the surface below it and drops",
         )
         assert why in line.tooltip.plain
         await session.open(scenarios / "crates.yaml")

@@ -17,7 +17,9 @@ from tests.workbench.setup.setup_session import Opened, write_scenario
 async def test_the_first_scenario_is_previewed_with_its_settings(scenarios):
     async with Opened() as session:
         assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
-        assert "11 models. A robot drives" in session.screen.query_one("#about", Static).render().plain
+        assert (
+            "11 models. A robot drives" in session.screen.query_one("#about", Static).render().plain
+        )
         settings = {"iterations": "3", "timeout": "45", "epsilon": "0.33", "seed": "0", "jobs": "4"}
         assert {id: session.value(id) for id in settings} == settings
         assert session.value("run_name") == "crates-1"
@@ -63,7 +65,9 @@ async def test_rarely_used_settings_are_opened_and_closed(scenarios):
 PANES = {"f2": ("#choice", "#preview"), "f3": ("#preview",), "f4": ("#fields", "#explained")}
 
 
-@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(64, 18), (109, 40), (120, 30)], but=[(64, 18)]), ids=str)
+@pytest.mark.parametrize(
+    "size", slow(pytest.mark.screens, [(64, 18), (109, 40), (120, 30)], but=[(64, 18)]), ids=str
+)
 async def test_small_terminals_show_one_pane_at_a_time(scenarios, size):
     async with Opened(size) as session:
         for key, shown in PANES.items():
@@ -158,7 +162,10 @@ async def test_a_field_is_checked_when_it_is_left_and_its_error_goes_when_it_is_
         await session.press("3", "tab")
         assert session.wrong() == "✗ timeout s: expected 0.01 to 100000, found -3"
         # The error is next to the fields, above all that does not belong to them.
-        assert session.screen.query_one("#wrong").region.y == session.screen.query_one("#fields").region.bottom
+        assert (
+            session.screen.query_one("#wrong").region.y
+            == session.screen.query_one("#fields").region.bottom
+        )
         timeout.focus()
         await session.press("3", "0")
         assert session.wrong() == "" and not timeout.has_class("-wrong")
@@ -198,11 +205,15 @@ async def test_recent_runs_are_listed_and_opened(scenarios, runs):
     (runs / "bad.ddenv").write_text("no run")
     async with Opened() as session:
         options = session.screen.query_one("#run-list", OptionList)
-        assert {option.id for option in options.options} == {str(path) for path in runs.glob("*.ddenv")}
+        assert {option.id for option in options.options} == {
+            str(path) for path in runs.glob("*.ddenv")
+        }
         options.focus()
         options.highlighted = options.get_option_index(str(runs / "bad.ddenv"))
         await session.press("enter")
-        assert any("is not a ddenv run file" in notice.message for notice in session.app._notifications)
+        assert any(
+            "is not a ddenv run file" in notice.message for notice in session.app._notifications
+        )
         options.highlighted = options.get_option_index(str(runs / "old.ddenv"))
         await session.pilot.press("enter")
         await session.pilot.pause()

@@ -49,7 +49,13 @@ async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
 async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, started):
     own = {
         "failure": {"timeout": 12, "epsilon": 0.25},
-        "reduction": {"iterations": 9, "baseline_runs": 5, "seed": 4, "pair": "timeseg/random", "algorithm": "ddmin"},
+        "reduction": {
+            "iterations": 9,
+            "baseline_runs": 5,
+            "seed": 4,
+            "pair": "timeseg/random",
+            "algorithm": "ddmin",
+        },
     }
     write_scenario(scenarios, **own)
     fields = ("timeout", "epsilon", "iterations", "baseline_runs", "seed")
@@ -60,7 +66,14 @@ async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, st
         await session.press("ctrl+s")
         assert session.screen.query_one("#timeout", Input).has_class("-wrong")
         await session.open(scenarios / "crates.sdf")
-        assert [session.value(id) for id in (*fields, "jobs")] == ["45", "0.33", "3", "10", "0", "4"]
+        assert [session.value(id) for id in (*fields, "jobs")] == [
+            "45",
+            "0.33",
+            "3",
+            "10",
+            "0",
+            "4",
+        ]
         assert session.method() == ["ddenv", "model2model", "avg-trajectory-proximal"]
         assert not session.screen.query(".-wrong")
         assert session.wrong() == ""

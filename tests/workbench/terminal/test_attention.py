@@ -11,7 +11,10 @@ from ddenv.workbench.app import BELL, Config, Workbench, attention
     ("environment", "sent"),
     [
         ({"TERM": "xterm-256color"}, "\x1b]9;ddenv: 2 left, really\x1b\\"),
-        ({"TERM": "xterm-256color", "VTE_VERSION": "7600"}, "\x1b]777;notify;ddenv;2 left, really\x1b\\"),
+        (
+            {"TERM": "xterm-256color", "VTE_VERSION": "7600"},
+            "\x1b]777;notify;ddenv;2 left, really\x1b\\",
+        ),
         ({"TERM": "rxvt-unicode"}, "\x1b]777;notify;ddenv;2 left, really\x1b\\"),
     ],
 )

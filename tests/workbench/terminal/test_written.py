@@ -61,9 +61,13 @@ def test_only_cells_that_changed_are_sent():
 
 def test_what_is_sent_in_parts_looks_as_if_all_was_sent():
     frames = [
-        layout([("▀▀ part A ", PLAIN), ("similar", RED)], [("part B    ", RED), ("running", PLAIN)]),
+        layout(
+            [("▀▀ part A ", PLAIN), ("similar", RED)], [("part B    ", RED), ("running", PLAIN)]
+        ),
         layout([("▀█ part A ", RED), ("similar", RED)], [("part B    ", RED), ("runs 12", PLAIN)]),
-        layout([("▀█", PLAIN), (" part A ", Style.parse("bold")), ("similar", RED)], [(" " * 17, RED)]),
+        layout(
+            [("▀█", PLAIN), (" part A ", Style.parse("bold")), ("similar", RED)], [(" " * 17, RED)]
+        ),
     ]
     written = Written()
     steps = [sent(written, frame) for frame in frames]
@@ -125,7 +129,9 @@ async def updates(run, monkeypatch):
 
 
 async def test_the_terminal_shows_what_textual_itself_would_show(updates):
-    assert callable(getattr(App, "_display", None)), "App._display is gone: nothing goes through written.py any more"
+    assert callable(getattr(App, "_display", None)), (
+        "App._display is gone: nothing goes through written.py any more"
+    )
     assert {type(update) for update in updates} == {LayoutUpdate, ChopsUpdate}
     assert all(isinstance(update, CompositorUpdate) for update in updates)
     written = Written()

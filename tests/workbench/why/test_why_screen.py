@@ -39,7 +39,9 @@ async def test_each_model_has_its_sentence_its_rate_and_its_two_ways(run, watch)
         known = reasons(file, run.state)
     async with Attached(run, watch=watch) as session:
         screen = await opened(session)
-        assert "what is left: f in 23 of 23 fresh runs (80 % to 100 %)" in words(screen, "#why-header")
+        assert "what is left: f in 23 of 23 fresh runs (80 % to 100 %)" in words(
+            screen, "#why-header"
+        )
         options = screen.query_one(OptionList)
         for number, one in enumerate(known):
             row = str(options.get_option_at_index(number).prompt)
@@ -73,9 +75,13 @@ async def test_while_the_run_goes_on_it_waits_and_fills_by_itself(run):
         screen = await opened(session)
         assert "It is being made: 17 of about" in words(screen, "#why-empty")
         kept = percent(Pairs(both=11, second=1).keeps_at_least(0.03 * IN_TURN))
-        assert f"so far at least {kept} of the whole world's rate is kept" in words(screen, "#why-empty")
+        assert f"so far at least {kept} of the whole world's rate is kept" in words(
+            screen, "#why-empty"
+        )
         run.certify_all(2, "crate_01", "ppp")
-        run.finish_certificate((None, "kept", 6 * "s"), ("crate_00", "needed", "opp"), ("crate_01", "needed", "ppp"))
+        run.finish_certificate(
+            (None, "kept", 6 * "s"), ("crate_00", "needed", "opp"), ("crate_01", "needed", "ppp")
+        )
         run.write("finished", minimal=True, reason="no single model can be removed")
         await session.look()
         screen._look()
@@ -110,11 +116,17 @@ async def test_where_the_rate_is_lost_it_is_said_that_no_model_was_left_out(run)
     run.finish_certificate((None, "lost", 6 * "so"))
     async with Attached(run) as session:
         said = words(await opened(session), "#why-empty")
-    assert "none was left out: what is left keeps less than 80 %" in said and "f in 6 of 12 fresh runs" in said
+    assert (
+        "none was left out: what is left keeps less than 80 %" in said
+        and "f in 6 of 12 fresh runs" in said
+    )
     typed = CliRunner().invoke(command_line, ["why", str(run.path)], standalone_mode=False)
     assert typed.output.split() == said.split()
     write_report(run.path, run.path.with_suffix(".md"))
-    assert "none was left out: what is left keeps less than 80 %" in run.path.with_suffix(".md").read_text()
+    assert (
+        "none was left out: what is left keeps less than 80 %"
+        in run.path.with_suffix(".md").read_text()
+    )
 
 
 async def test_damaged_trajectories_are_told_and_the_rest_is_shown(run):
@@ -149,7 +161,9 @@ async def test_stacks_are_left_out_together(runs):
 
 
 @pytest.mark.parametrize("damaged", [False, True])
-async def test_the_nearest_world_that_passes_stands_at_the_end_with_both_runs_side_by_side(run, damaged):
+async def test_the_nearest_world_that_passes_stands_at_the_end_with_both_runs_side_by_side(
+    run, damaged
+):
     fake_moments.isolated(run)
     with RunFile(run.path) as file:
         known = nearest(file, run.state)
@@ -159,7 +173,9 @@ async def test_the_nearest_world_that_passes_stands_at_the_end_with_both_runs_si
         screen = await opened(session)
         options = screen.query_one(OptionList)
         await session.press("end")
-        assert "nearest world that passes" in str(options.get_option_at_index(options.option_count - 1).prompt)
+        assert "nearest world that passes" in str(
+            options.get_option_at_index(options.option_count - 1).prompt
+        )
         said = words(screen, "#why-said")
         assert known.words[1:] in said
         assert set(screen.map.shown.candidate.models) == set(run.elements) - set(known.gone)
@@ -171,7 +187,10 @@ async def test_the_nearest_world_that_passes_stands_at_the_end_with_both_runs_si
         await session.press("enter")
         await session.app.workers.wait_for_complete()
         played = session.app.screen
-        assert [one.test.id for one in played._tests] == [known.parting.with_test, known.parting.without_test]
+        assert [one.test.id for one in played._tests] == [
+            known.parting.with_test,
+            known.parting.without_test,
+        ]
 
 
 async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, started):
@@ -181,7 +200,11 @@ async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, sta
         assert "world that passes" in session.text(KeyFooter)
         await session.press("i")
         assert started == [
-            (run.path.name, run.state.jobs, {"accept_mode": "automatic", "attended": "yes", "isolate": 0})
+            (
+                run.path.name,
+                run.state.jobs,
+                {"accept_mode": "automatic", "attended": "yes", "isolate": 0},
+            )
         ]
         # The engine begins.
         run.hold()
@@ -189,7 +212,9 @@ async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, sta
         run.live((run.isolate(run.remove("crate_00", "crate_01"), 0), 0.5))
         await session.look()
         screen._look()
-        assert words(screen, "#why-header").startswith(" finding the nearest world that passes: without 2 models ·")
+        assert words(screen, "#why-header").startswith(
+            " finding the nearest world that passes: without 2 models ·"
+        )
         await session.press("i")
         assert session.asked() == [("stop", {})]
         run.write("engine_stopped", reason="stopped by the user")
@@ -224,7 +249,9 @@ async def test_why_the_nearest_world_that_passes_cannot_be_found_now(run, starte
 def picture_of(session):
     """The whole screen as one text."""
     strips = session.app.screen._compositor.render_strips()
-    return " ".join(" ".join("".join(segment.text for segment in strip).split()) for strip in strips)
+    return " ".join(
+        " ".join("".join(segment.text for segment in strip).split()) for strip in strips
+    )
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [(80, 24), (120, 36)], but=[(80, 24)]))
@@ -246,13 +273,25 @@ async def test_a_number_is_shown_at_its_limits_and_played_beside_what_is_left(ru
         screen = await opened(session)
         assert "; other numbers" in str(screen.query_one("#why-models").border_title)
         options = screen.query_one(OptionList)
-        rows = [str(options.get_option_at_index(number).prompt).split() for number in range(options.option_count)]
-        assert rows[-2:] == [["crate_00.friction", "goal", "at", "0.4"], ["crate_01.y", "no", "f", "at", "0.31"]]
+        rows = [
+            str(options.get_option_at_index(number).prompt).split()
+            for number in range(options.option_count)
+        ]
+        assert rows[-2:] == [
+            ["crate_00.friction", "goal", "at", "0.4"],
+            ["crate_01.y", "no", "f", "at", "0.31"],
+        ]
         await session.press("up", "up")
         said = words(screen, "#why-said")
         assert "the robot reaches its goal at 0.4" in said
-        assert f"ddenv test {run.path.stem} --minimal --margin crate_00.friction=0.4 --repeat 10" in said
-        assert f"ddenv export {run.path.stem} --margin crate_00.friction=0.4 --output changed.sdf" in said
+        assert (
+            f"ddenv test {run.path.stem} --minimal --margin crate_00.friction=0.4 --repeat 10"
+            in said
+        )
+        assert (
+            f"ddenv export {run.path.stem} --margin crate_00.friction=0.4 --output changed.sdf"
+            in said
+        )
         assert [way.name for way in screen.map.shown.ways] == ["now", "at 0.4"]
         # A friction moves nothing; a place is outlined where f still shows, where it does not, and where the model cannot be.
         assert screen.map.shown.limits == ()

@@ -18,7 +18,12 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_what_has_no_choice_is_completed(folder):
-    ends = {"wo": "worlds/", "worlds/": "worlds/depot", "worlds/depot.": "worlds/depot.world", "~/w": "~/worlds/"}
+    ends = {
+        "wo": "worlds/",
+        "worlds/": "worlds/depot",
+        "worlds/depot.": "worlds/depot.world",
+        "~/w": "~/worlds/",
+    }
     ends |= {"worlds/.h": "worlds/.hidden", f"{folder}/w": f"{folder}/worlds/"}
     same = ("worlds/depot", "no", "no/where/x", "a\0b/c", "~nobody-of-this-name/x", "x" * 5000)
     assert {text: completed(text) for text in ends} == ends

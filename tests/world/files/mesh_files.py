@@ -10,7 +10,9 @@ from ddenv.world.files.meshes import build, read_parts, unpack
 
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 CORNERS = [(x, y, z) for x in (0, 1) for y in (0, 2) for z in (0, 3)]
-BOX = trimesh.Trimesh(CORNERS, [face for a, b, c, d in QUADS for face in ((a, b, c), (a, c, d))], process=False)
+BOX = trimesh.Trimesh(
+    CORNERS, [face for a, b, c, d in QUADS for face in ((a, b, c), (a, c, d))], process=False
+)
 
 
 def mesh_of(path, data, **way):
@@ -68,14 +70,26 @@ def gltf(uri=None, **changes):
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"name": "tip", "mesh": 0}],
-        "meshes": [{"name": "shape", "primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 7}]}],
+        "meshes": [
+            {
+                "name": "shape",
+                "primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 7}],
+            }
+        ],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
             {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
         ],
-        "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 24}],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 24},
+        ],
         "buffers": [
-            {"byteLength": 72, "uri": uri or "data:application/octet-stream;base64," + base64.b64encode(data).decode()}
+            {
+                "byteLength": 72,
+                "uri": uri
+                or "data:application/octet-stream;base64," + base64.b64encode(data).decode(),
+            }
         ],
         "images": [{"uri": "../../etc/passwd"}],
     }

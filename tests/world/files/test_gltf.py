@@ -18,12 +18,18 @@ def test_gltf_keeps_its_axes_and_places_instances(tmp_path):
             "scale": [1, 2, 1],
             "translation": [1, 0, 0],
         },
-        {"name": "mirrored", "mesh": 0, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1]},
+        {
+            "name": "mirrored",
+            "mesh": 0,
+            "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1],
+        },
         {"name": "unused", "mesh": 0},
     ]
     text, _ = gltf(nodes=nodes)
     assert len(mesh_of(tmp_path / "a.gltf", text).faces) == 8
-    assert np.allclose(bounds(mesh_of(tmp_path / "a.gltf", text, submesh="turned")), [[-3, 0, 10], [1, 1, 13]])
+    assert np.allclose(
+        bounds(mesh_of(tmp_path / "a.gltf", text, submesh="turned")), [[-3, 0, 10], [1, 1, 13]]
+    )
     mirrored = mesh_of(tmp_path / "a.gltf", text, submesh="mirrored")
     assert np.allclose(bounds(mirrored), [[4, 0, 10], [5, 2, 13]])
     assert solid(mirrored).volume == pytest.approx(1)
@@ -49,11 +55,15 @@ def test_gltf_buffer_beside_it_and_glb(tmp_path):
     scene = trimesh.Scene()
     for place in (0, 10):
         scene.add_geometry(
-            BOX, node_name=f"box{place}", transform=trimesh.transformations.translation_matrix([place, 0, 0])
+            BOX,
+            node_name=f"box{place}",
+            transform=trimesh.transformations.translation_matrix([place, 0, 0]),
         )
     mesh = mesh_of(tmp_path / "a.glb", scene.export(file_type="glb"))
     assert bounds(mesh) == [[0, 0, 0], [11, 2, 3]]
-    assert bounds(mesh_of(tmp_path / "a.glb", scene.export(file_type="glb"), submesh="box10"))[0] == [10, 0, 0]
+    assert bounds(mesh_of(tmp_path / "a.glb", scene.export(file_type="glb"), submesh="box10"))[
+        0
+    ] == [10, 0, 0]
 
 
 @pytest.mark.parametrize(("mode", "corners"), [(4, 3), (5, 4)])
@@ -98,14 +108,26 @@ HOSTILE_GLTF = {
     "negative": (gltf(accessors=accessor(byteOffset=-8)), "negative numbers"),
     "stride": (gltf(bufferViews=views(byteStride=0)), "not a valid GLTF"),
     "sparse": (gltf(accessors=accessor(sparse={})), "not supported"),
-    "fan": (gltf(meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "mode": 6}]}]), "fans are not supported"),
+    "fan": (
+        gltf(meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "mode": 6}]}]),
+        "fans are not supported",
+    ),
     "views": (gltf(bufferViews=[{"buffer": 0, "byteLength": 10**9}]), "larger than its buffers"),
     "beyond": (gltf(accessors=accessor(count=5)), "not a valid GLTF"),
-    "indices": (gltf(bufferViews=[{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteLength": 24}]), "does not exist"),
+    "indices": (
+        gltf(bufferViews=[{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteLength": 24}]),
+        "does not exist",
+    ),
     "kind": (gltf(accessors=accessor(componentType=5120)), "not supported"),
     "mesh": (gltf(nodes=[{"children": [1], "mesh": -1}, {"mesh": 0}]), "negative numbers"),
-    "infinite": (gltf(nodes=[{"mesh": 0, "rotation": [0, 0, 0, float("inf")]}]), "not a valid GLTF"),
-    "draco": (gltf(extensionsRequired=["KHR_draco_mesh_compression"]), "KHR_draco_mesh_compression is not supported"),
+    "infinite": (
+        gltf(nodes=[{"mesh": 0, "rotation": [0, 0, 0, float("inf")]}]),
+        "not a valid GLTF",
+    ),
+    "draco": (
+        gltf(extensionsRequired=["KHR_draco_mesh_compression"]),
+        "KHR_draco_mesh_compression is not supported",
+    ),
     "version": (gltf(asset={"version": "1.0"}), "only GLTF 2 is supported"),
     "no asset": (gltf(asset={}), "it has no .version."),
     "no mesh": (gltf(meshes=[]), "not a valid GLTF"),

@@ -60,13 +60,21 @@ def test_obj_counts_back_from_the_face_and_fans(tmp_path):
     assert len(second.faces) == 3
     assert (solid(second).face_normals[:, 2] == 1).all()
     assert bounds(second) == [[0, 0, 5], [1, 2, 5]]
-    assert mesh_of(tmp_path / "a.obj", OBJ, submesh="left side").vertices.tolist() == first.vertices.tolist()
-    assert bounds(mesh_of(tmp_path / "a.obj", OBJ, submesh="right", center=True)) == [[-0.5, -1, 0], [0.5, 1, 0]]
+    assert (
+        mesh_of(tmp_path / "a.obj", OBJ, submesh="left side").vertices.tolist()
+        == first.vertices.tolist()
+    )
+    assert bounds(mesh_of(tmp_path / "a.obj", OBJ, submesh="right", center=True)) == [
+        [-0.5, -1, 0],
+        [0.5, 1, 0],
+    ]
     assert len(mesh_of(tmp_path / "a.obj", OBJ).faces) == 4
 
 
 def test_obj_names_are_kept_apart(tmp_path):
-    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\no a_b\nf 1 2 3\no a\ng b\nf 1 2 3\no a_b\nf 1 2 3")
+    (tmp_path / "a.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\no a_b\nf 1 2 3\no a\ng b\nf 1 2 3\no a_b\nf 1 2 3"
+    )
     assert [(part.names, len(part.faces)) for part in read_parts(tmp_path / "a.obj")] == [
         (("a_b", ""), 2),
         (("a", "b"), 1),
@@ -137,7 +145,11 @@ def test_any_bytes_give_a_mesh_or_a_reason(tmp_path_factory, suffix, data):
     if data.draw(st.booleans()):
         del content[data.draw(st.integers(0, len(content))) :]
     try:
-        mesh = mesh_of(tmp_path_factory.getbasetemp() / f"any{suffix}", bytes(content), convex=data.draw(st.booleans()))
+        mesh = mesh_of(
+            tmp_path_factory.getbasetemp() / f"any{suffix}",
+            bytes(content),
+            convex=data.draw(st.booleans()),
+        )
     except Unusable as error:
         assert "\n" not in str(error) and len(str(error)) < 300
     else:
@@ -184,7 +196,9 @@ def test_the_hull_of_many_points_keeps_their_extent(monkeypatch):
     for points in (ball, ball / np.linalg.norm(ball, axis=1)[:, None], ball * [5, 1, 1e-9]):
         vertices, _ = meshes.convex_hull(points)
         assert np.allclose(
-            [vertices.min(axis=0), vertices.max(axis=0)], [points.min(axis=0), points.max(axis=0)], atol=0.01
+            [vertices.min(axis=0), vertices.max(axis=0)],
+            [points.min(axis=0), points.max(axis=0)],
+            atol=0.01,
         )
 
 
@@ -192,14 +206,18 @@ def test_the_hull_of_many_points_keeps_their_extent(monkeypatch):
 def test_a_mesh_of_too_many_triangles_is_refused_in_a_line(tmp_path, monkeypatch, suffix):
     ball = trimesh.creation.icosphere(subdivisions=3)
     monkeypatch.setattr("ddenv.world.files.triangles.MOST_FACES", 1000)
-    with pytest.raises(Unusable, match=r"has 0\.0 million triangles; the maximum is 0\.001 million: simplify it"):
+    with pytest.raises(
+        Unusable, match=r"has 0\.0 million triangles; the maximum is 0\.001 million: simplify it"
+    ):
         mesh_of(tmp_path / f"a.{suffix}", ball.export(file_type=suffix), convex=True)
 
 
 def run(text: str, seed: str = "0") -> str:
     """What a new process prints."""
     environment = {"PYTHONPATH": os.pathsep.join(sys.path), "PYTHONHASHSEED": seed}
-    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True, env=environment)
+    done = subprocess.run(
+        [sys.executable, "-c", text], capture_output=True, text=True, check=True, env=environment
+    )
     return done.stdout.strip()
 
 
@@ -212,7 +230,10 @@ def test_same_bytes_in_every_process(tmp_path):
         dae(nodes="<node><rotate>1 2 3 40</rotate><instance_geometry url='#g'/></node>" * 3)
     )
     triangles = {"attributes": {"POSITION": 0}, "indices": 1}
-    nodes = [{"mesh": 0, "children": [1], "rotation": [0.1, 0.2, 0.3, 0.9]}, {"mesh": 0, "scale": [1, 2, 3]}]
+    nodes = [
+        {"mesh": 0, "children": [1], "rotation": [0.1, 0.2, 0.3, 0.9]},
+        {"mesh": 0, "scale": [1, 2, 3]},
+    ]
     (tmp_path / "c.gltf").write_text(gltf(meshes=[{"primitives": [triangles] * 4}], nodes=nodes)[0])
     text = f"""
 from pathlib import Path

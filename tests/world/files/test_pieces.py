@@ -41,7 +41,11 @@ SIZE = st.floats(1.5, 12.0)
 
 @examples(0.3)
 @given(
-    width=SIZE, depth=SIZE, door=st.floats(0.4, 1.0), turn=st.floats(-180, 180), order=st.randoms(use_true_random=False)
+    width=SIZE,
+    depth=SIZE,
+    door=st.floats(0.4, 1.0),
+    turn=st.floats(-180, 180),
+    order=st.randoms(use_true_random=False),
 )
 def test_a_house_is_cut_exactly_and_its_door_stays_open(width, depth, door, turn, order):
     whole = house(width, depth, door)
@@ -67,7 +71,11 @@ def encloses(piece, place):
 
 
 @examples(0.3)
-@given(boxes=st.lists(st.tuples(*[st.integers(0, 4)] * 3, *[st.integers(1, 3)] * 3), min_size=1, max_size=6))
+@given(
+    boxes=st.lists(
+        st.tuples(*[st.integers(0, 4)] * 3, *[st.integers(1, 3)] * 3), min_size=1, max_size=6
+    )
+)
 def test_pieces_fill_what_a_solid_fills(boxes):
     """Also with holes, steps, and parts that touch in an edge or a corner."""
     whole = sum_of(boxes)
@@ -80,7 +88,9 @@ def test_pieces_fill_what_a_solid_fills(boxes):
 def sum_of(boxes):
     whole = Manifold()
     for x, y, z, *size in boxes:
-        whole = whole + Manifold.cube(tuple(map(float, size))).translate((float(x), float(y), float(z)))
+        whole = whole + Manifold.cube(tuple(map(float, size))).translate(
+            (float(x), float(y), float(z))
+        )
     return whole
 
 
@@ -93,7 +103,11 @@ def sum_of_meshes(pieces):
 
 def test_a_table_can_be_driven_under():
     top = Manifold.cube((1.2, 0.8, 0.05)).translate((0.0, 0.0, 0.7))
-    legs = [Manifold.cube((0.05, 0.05, 0.72)).translate((x, y, 0.0)) for x in (0.0, 1.15) for y in (0.0, 0.75)]
+    legs = [
+        Manifold.cube((0.05, 0.05, 0.72)).translate((x, y, 0.0))
+        for x in (0.0, 1.15)
+        for y in (0.0, 0.75)
+    ]
     table = top
     for leg in legs:
         table = table + leg
@@ -104,7 +118,11 @@ def test_a_table_can_be_driven_under():
 
 def test_a_flat_sheet_is_one_thin_box():
     corners = [(x, y, 0.0) for x in range(11) for y in range(11)]
-    squares = [(11 * x + y, 11 * x + 11 + y, 11 * x + 12 + y, 11 * x + y + 1) for x in range(10) for y in range(10)]
+    squares = [
+        (11 * x + y, 11 * x + 11 + y, 11 * x + 12 + y, 11 * x + y + 1)
+        for x in range(10)
+        for y in range(10)
+    ]
     faces = [face for a, b, c, d in squares for face in ((a, b, c), (a, c, d))]
     [piece] = cut(corners, faces)
     box, pose = box_of(piece)
@@ -130,7 +148,9 @@ def test_a_curved_sheet_of_many_triangles_is_patches_that_follow_it():
     x, y = np.meshgrid(np.linspace(0, 10, 40), np.linspace(0, 10, 40), indexing="ij")
     corners = np.column_stack([x.ravel(), y.ravel(), np.sin(x.ravel()) * np.cos(y.ravel())])
     cells = np.arange(1600).reshape(40, 40)
-    a, b, c, d = (part.ravel() for part in (cells[:-1, :-1], cells[1:, :-1], cells[1:, 1:], cells[:-1, 1:]))
+    a, b, c, d = (
+        part.ravel() for part in (cells[:-1, :-1], cells[1:, :-1], cells[1:, 1:], cells[:-1, 1:])
+    )
     faces = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
     assert len(faces) > MOST_PLATES
     pieces = cut(corners, faces, 512)
@@ -174,7 +194,8 @@ def test_pieces_are_cut_once_and_what_is_damaged_is_cut_again(tmp_path, monkeypa
     monkeypatch.setenv("DDENV_HOME", str(tmp_path))
     cuts = []
     monkeypatch.setattr(
-        "ddenv.world.files.pieces.convex_pieces", lambda *given: cuts.append(1) or convex_pieces(*given)
+        "ddenv.world.files.pieces.convex_pieces",
+        lambda *given: cuts.append(1) or convex_pieces(*given),
     )
     parts = [Part("", *surface(house(4.0, 3.0, 0.9)))]
 

@@ -46,9 +46,13 @@ def test_folders_in_order_without_doubles(tmp_path, monkeypatch):
     folders = {name: tmp_path / name for name in names}
     for folder in folders.values():
         folder.mkdir(parents=True)
-    monkeypatch.setenv("GZ_SIM_RESOURCE_PATH", f"{folders['gz']}{os.pathsep}{os.pathsep}{tmp_path / 'gone'}")
+    monkeypatch.setenv(
+        "GZ_SIM_RESOURCE_PATH", f"{folders['gz']}{os.pathsep}{os.pathsep}{tmp_path / 'gone'}"
+    )
     monkeypatch.setenv("IGN_GAZEBO_RESOURCE_PATH", str(folders["ignition"]))
-    monkeypatch.setenv("GAZEBO_MODEL_PATH", f"~/models{os.pathsep}{folders['classic']}/{os.pathsep}~nobody/x")
+    monkeypatch.setenv(
+        "GAZEBO_MODEL_PATH", f"~/models{os.pathsep}{folders['classic']}/{os.pathsep}~nobody/x"
+    )
     monkeypatch.setenv("SDF_PATH", f"{folders['sdf']}{os.pathsep}{folders['gz']}/../gz")
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(folders["ros1"]))
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"{tmp_path / 'ros2'}{os.pathsep}{tmp_path / 'gone'}")
@@ -167,15 +171,28 @@ def test_missing(models, uri, reason):
 
 
 def test_fuel_cache(tmp_path, monkeypatch):
-    cache = tmp_path / "home" / ".gz" / "fuel" / "fuel.gazebosim.org" / "openrobotics" / "models" / "oak tree"
+    cache = (
+        tmp_path
+        / "home"
+        / ".gz"
+        / "fuel"
+        / "fuel.gazebosim.org"
+        / "openrobotics"
+        / "models"
+        / "oak tree"
+    )
     for version in ("2", "9", "10", "tip"):
         put(cache / version / "meshes" / "oak.dae")
     start = "https://fuel.gazebosim.org/1.0/OpenRobotics/models/Oak%20tree"
     assert find(start, tmp_path, ()) == cache / "10"
     assert find(f"{start}/tip", tmp_path, ()) == cache / "10"
     assert find(f"{start}/2", tmp_path, ()) == cache / "2"
-    assert find(f"{start}/2/files/meshes/oak.dae", tmp_path, ()) == cache / "2" / "meshes" / "oak.dae"
-    assert find(f"{start}/files/meshes/oak.dae", tmp_path, ()) == cache / "10" / "meshes" / "oak.dae"
+    assert (
+        find(f"{start}/2/files/meshes/oak.dae", tmp_path, ()) == cache / "2" / "meshes" / "oak.dae"
+    )
+    assert (
+        find(f"{start}/files/meshes/oak.dae", tmp_path, ()) == cache / "10" / "meshes" / "oak.dae"
+    )
     old = start.replace("gazebosim", "ignitionrobotics")
     assert find(f"{old}/9", tmp_path, ()) == cache / "9"
     with pytest.raises(Missing):
@@ -193,7 +210,9 @@ def test_the_fuel_cache_is_searched_for_a_models_name_last(tmp_path, models):
             put(fuel / owner / "models" / "box" / version / "model.sdf")
     gazebos = fuel / "openrobotics" / "models" / "pine tree" / "11"
     assert find("model://pine_tree", tmp_path, (models,)) == gazebos
-    assert find("model://Pine%20tree/meshes/pine.dae", tmp_path, ()) == gazebos / "meshes" / "pine.dae"
+    assert (
+        find("model://Pine%20tree/meshes/pine.dae", tmp_path, ()) == gazebos / "meshes" / "pine.dae"
+    )
     assert find("model://box", tmp_path, (models,)) == models / "box"
     with pytest.raises(Unusable, match="leaves its folder"):
         find("model://pine_tree/../../secret", tmp_path, ())
@@ -244,7 +263,12 @@ def test_model_file(tmp_path):
     for name in ("model.sdf", "old.sdf", "new.sdf", "future.sdf"):
         put(tmp_path / name)
     assert model_file(tmp_path).name == "model.sdf"
-    config(tmp_path, "<sdf version='1.4'>old.sdf</sdf>", "<sdf version='1.12'>new.sdf</sdf>", "<sdf>model.sdf</sdf>")
+    config(
+        tmp_path,
+        "<sdf version='1.4'>old.sdf</sdf>",
+        "<sdf version='1.12'>new.sdf</sdf>",
+        "<sdf>model.sdf</sdf>",
+    )
     assert model_file(tmp_path).name == "new.sdf"
     config(tmp_path, "<sdf version='1.9'> old.sdf </sdf>", "<sdf version='1.13'>future.sdf</sdf>")
     assert model_file(tmp_path).name == "old.sdf"
@@ -285,7 +309,11 @@ def test_model_folder_without_file(tmp_path):
 
 def test_read_refuses_what_is_no_file(tmp_path):
     os.mkfifo(tmp_path / "pipe")
-    for name, reason in (("", "is a folder"), ("pipe", "not a regular file"), ("none", "no such file")):
+    for name, reason in (
+        ("", "is a folder"),
+        ("pipe", "not a regular file"),
+        ("none", "no such file"),
+    ):
         with pytest.raises(Unusable, match=reason):
             read(tmp_path / name, 10)
     with pytest.raises(Unusable, match="the maximum is"):
@@ -294,7 +322,22 @@ def test_read_refuses_what_is_no_file(tmp_path):
 
 
 WORDS = st.sampled_from(
-    ["..", ".", "box", "%2e%2e", "%2f", "/", "//", "model:", "file:", "https:", "~", "\0", "a b", "\ud800"]
+    [
+        "..",
+        ".",
+        "box",
+        "%2e%2e",
+        "%2f",
+        "/",
+        "//",
+        "model:",
+        "file:",
+        "https:",
+        "~",
+        "\0",
+        "a b",
+        "\ud800",
+    ]
 )
 
 
@@ -333,7 +376,10 @@ def test_files_of_worlds_in_fuel_and_addresses_without_the_number_of_the_interfa
     put(host / "models" / "box" / "1" / "model.sdf")
     uri = "https://fuel.gazebosim.org/1.0/Some%20One/worlds/Big%20Hall/tip/files/meshes/Hall.dae"
     assert find(uri, tmp_path, {}) == mesh
-    assert find("http://fuel.gazebosim.org//Some One/models/Box/", tmp_path, {}) == host / "models" / "box" / "1"
+    assert (
+        find("http://fuel.gazebosim.org//Some One/models/Box/", tmp_path, {})
+        == host / "models" / "box" / "1"
+    )
 
 
 def test_a_link_that_leads_out_of_the_cache_is_not_followed(tmp_path):
@@ -354,7 +400,10 @@ def test_a_link_that_leads_out_of_the_cache_is_not_followed(tmp_path):
 @pytest.mark.parametrize(
     ("uri", "url"),
     [
-        (" https://fuel.gazebosim.org/1.0/Open%20R/models/Oak tree/2/files/a.dae", "Open%20R/models/Oak%20tree/2"),
+        (
+            " https://fuel.gazebosim.org/1.0/Open%20R/models/Oak tree/2/files/a.dae",
+            "Open%20R/models/Oak%20tree/2",
+        ),
         ("http://fuel.ignitionrobotics.org/1.0/o/worlds/w/tip", "o/worlds/w"),
         ("https://FUEL.gazebosim.org/o/models/it's;rm", "o/models/it%27s%3Brm"),
         ("https://fuel.gazebosim.org/1.0/../models/x", None),

@@ -89,7 +89,9 @@ def test_damaged_bytes(world):
             Resources({keys["sdf"]: bad}).sdf("model://box", world)
 
 
-@pytest.mark.parametrize("bad", [b"", b"\1", b"\2\0\0\0\1\0\0\0x", b"\xff\xff\xff\xff", b"\1\0\0\0\5\0\0\0abc"])
+@pytest.mark.parametrize(
+    "bad", [b"", b"\1", b"\2\0\0\0\1\0\0\0x", b"\xff\xff\xff\xff", b"\1\0\0\0\5\0\0\0abc"]
+)
 def test_damaged_pieces(world, bad):
     disk = Resources({}, search_roots((), world))
     disk.pieces(MeshPart("cube.obj", world), (1.0, 1.0, 1.0), 8)

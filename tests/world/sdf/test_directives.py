@@ -44,7 +44,9 @@ FLOOR = """directives:
 - add_directives: {file: package://things/room.dmd.yaml, model_namespace: room}
 - add_frame: {name: "room::arm::spot", X_PF: {base_frame: "room::arm::foot", rotation: !Rpy {deg: [0, 90, 0]}}}
 """
-CRATES = "".join(f"- add_model: {{name: {name}, file: package://things/crate.sdf}}\n" for name in "abc")
+CRATES = "".join(
+    f"- add_model: {{name: {name}, file: package://things/crate.sdf}}\n" for name in "abc"
+)
 
 # Each is a file of its own.
 WORLDS = {
@@ -148,7 +150,11 @@ def written(folder: Path, text: str) -> Path:
 
 def in_drake(text: bytes, things: Path) -> dict[str, np.ndarray]:
     """The poses of all bodies where Drake puts them, by scoped name."""
-    from pydrake.multibody.parsing import LoadModelDirectivesFromString, Parser, ProcessModelDirectives
+    from pydrake.multibody.parsing import (
+        LoadModelDirectivesFromString,
+        Parser,
+        ProcessModelDirectives,
+    )
     from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
     from pydrake.multibody.tree import BodyIndex
     from pydrake.systems.framework import DiagramBuilder
@@ -160,11 +166,16 @@ def in_drake(text: bytes, things: Path) -> dict[str, np.ndarray]:
     plant.Finalize()
     context = plant.CreateDefaultContext()
     bodies = [plant.get_body(BodyIndex(number)) for number in range(1, plant.num_bodies())]
-    return {body.scoped_name().get_full(): body.EvalPoseInWorld(context).GetAsMatrix4() for body in bodies}
+    return {
+        body.scoped_name().get_full(): body.EvalPoseInWorld(context).GetAsMatrix4()
+        for body in bodies
+    }
 
 
 def as_read(world: World) -> dict[str, np.ndarray]:
-    names = {f"{model.name}::{link.name}": link.pose for model in world.models for link in model.links}
+    names = {
+        f"{model.name}::{link.name}": link.pose for model in world.models for link in model.links
+    }
     poses = {}
     for name, pose in names.items():
         matrix = np.eye(4)
@@ -175,7 +186,10 @@ def as_read(world: World) -> dict[str, np.ndarray]:
 
 def assert_same(ours: Mapping[str, np.ndarray], drakes: Mapping[str, np.ndarray]) -> None:
     # A model that is carried by another is a part of that.
-    named = {next(name for name in ours if name == full or name.endswith(f"::{full}")): full for full in drakes}
+    named = {
+        next(name for name in ours if name == full or name.endswith(f"::{full}")): full
+        for full in drakes
+    }
     assert len(named) == len(ours) == len(drakes)
     for name, full in named.items():
         np.testing.assert_allclose(ours[name], drakes[full], atol=1e-9, rtol=0, err_msg=name)
@@ -204,15 +218,23 @@ def test_what_is_left_is_the_files_own_text_that_drake_reads(name, things, tmp_p
             removed |= more
         text = without(world, frozenset(removed))
         lines = world.text.decode().splitlines()
-        assert [line for line in text.decode().splitlines() if line.strip(" []") and line not in lines] == []
+        assert [
+            line for line in text.decode().splitlines() if line.strip(" []") and line not in lines
+        ] == []
         again = as_read(parse_world(text, world.path, Reading(model_path=(things,))))
-        left = {name: pose for name, pose in poses.items() if not name.startswith(tuple(f"{one}::" for one in removed))}
+        left = {
+            name: pose
+            for name, pose in poses.items()
+            if not name.startswith(tuple(f"{one}::" for one in removed))
+        }
         assert again.keys() == left.keys()
         assert all(np.array_equal(again[name], left[name]) for name in left)
         assert_same(again, in_drake(text, things))
 
 
-def test_what_is_welded_to_a_model_is_tied_to_it_and_what_stands_relative_to_one_keeps_it(things, tmp_path):
+def test_what_is_welded_to_a_model_is_tied_to_it_and_what_stands_relative_to_one_keeps_it(
+    things, tmp_path
+):
     welds, frames, free = (read(tmp_path, WORLDS[name]) for name in ("welds", "frames", "free"))
     assert welds.ties == (("b", "a"), ("c", "b"))
     assert all(model.static for model in welds.models)
@@ -225,7 +247,13 @@ def test_what_is_welded_to_a_model_is_tied_to_it_and_what_stands_relative_to_one
 
 def test_what_is_welded_to_a_model_that_moves_is_a_part_of_it(things, tmp_path):
     (arm,) = read(tmp_path, WORLDS["gripper"]).models
-    assert [link.name for link in arm.links] == ["foot", "lower", "hand::palm", "tool::base", "tip::base"]
+    assert [link.name for link in arm.links] == [
+        "foot",
+        "lower",
+        "hand::palm",
+        "tool::base",
+        "tip::base",
+    ]
     ends = {joint.child: joint.parent for joint in arm.joints}
     assert ends["tip::base"] == "tool::base"
     assert ends["tool::base"] == "hand::palm"
@@ -249,9 +277,9 @@ def test_collision_filter_groups_lose_the_models_that_went(things, tmp_path):
     for removed in (["a"], ["c"], ["a", "b"], ["b", "c"]):
         text = without(world, frozenset(removed))
         in_drake(text, things)
-        assert [model.name for model in read(tmp_path, text.decode().partition("\n")[2]).models] == sorted(
-            {*"abc"} - {*removed}
-        )
+        assert [
+            model.name for model in read(tmp_path, text.decode().partition("\n")[2]).models
+        ] == sorted({*"abc"} - {*removed})
     kept = without(world, frozenset("a")).decode()
     assert "members: [ b::base]" in kept
     assert "name: g" not in without(world, frozenset("ab")).decode()
@@ -264,17 +292,20 @@ REFUSED = {
     "- add_model: {name: a, file: package://nowhere/crate.sdf}": "2: /add_model[@name='a']: 'package://nowhere",
     "- add_model: {name: a, flie: x}": "2: add_model: unknown key 'flie' (did you mean file?)",
     "- add_model: {name: a}": "2: add_model: file is missing",
-    CRATES + "- add_model: {name: b, file: package://things/crate.sdf}": "5: the model 'b' is added twice",
+    CRATES
+    + "- add_model: {name: b, file: package://things/crate.sdf}": "5: the model 'b' is added twice",
     CRATES
     + "- add_weld: {parent: world, child: a::lidd}": "5: there is no frame 'a::lidd' here (did you mean a::lid?)",
-    CRATES + "- add_weld: {parent: world, child: lid}": "5: 'lid' may be a::lid or b::lid or c::lid",
+    CRATES
+    + "- add_weld: {parent: world, child: lid}": "5: 'lid' may be a::lid or b::lid or c::lid",
     CRATES
     + "- add_weld: {parent: world, child: a::lid}\n- add_weld: {parent: b::lid, child: a::lid}": "6: 'a' is placed twice",
     CRATES + LOOP: "6: the place of 'a' depends on itself",
     CRATES + "- add_frame: {name: f, X_PF: {translation: [0, 0, 1]}}": "5: base_frame is missing",
     CRATES
     + "- add_weld: {parent: world, child: a::lid, X_PC: {translation: [0, .nan, 0]}}": "5: expected a finite number, found '.nan'",
-    CRATES + "- add_weld: {parent: world, child: a::lid, X_PC: {rotation: !Uniform {}}}": "5: !Uniform is random",
+    CRATES
+    + "- add_weld: {parent: world, child: a::lid, X_PC: {rotation: !Uniform {}}}": "5: !Uniform is random",
     PAIRS
     + "- add_weld: {parent: b::p, child: a::p}\n- add_weld: {parent: c::p, child: a::q}": "6: 'a' is welded to two models",
     PAIRS
@@ -294,7 +325,9 @@ REFUSED = {
 
 @pytest.mark.parametrize("text", REFUSED, ids=range(len(REFUSED)))
 def test_what_cannot_be_read_is_refused_in_one_line(text, things, tmp_path):
-    (things / "loop.dmd.yaml").write_text("directives:\n- add_directives: {file: package://things/loop.dmd.yaml}\n")
+    (things / "loop.dmd.yaml").write_text(
+        "directives:\n- add_directives: {file: package://things/loop.dmd.yaml}\n"
+    )
     with pytest.raises(UserError) as error:
         read(tmp_path, text)
     assert REFUSED[text] in str(error.value)
@@ -308,9 +341,9 @@ WRITTEN = {
     "crlf": f"directives:\n{CRATES}".replace("\n", "\r\n"),
     "bom": f"\ufeffdirectives:\n{CRATES}",
     "indented": f"directives: # all\n\n{CRATES}".replace("- add", "   # one - each\n   - add"),
-    "words": f"directives:\n{CRATES}".replace("things/crate.sdf}", "things/crate.sdf} # größer").replace(
-        "{name: c", "{name: Häuser"
-    ),
+    "words": f"directives:\n{CRATES}".replace(
+        "things/crate.sdf}", "things/crate.sdf} # größer"
+    ).replace("{name: c", "{name: Häuser"),
     "far apart": f"directives:\n{CRATES}".replace("- add", "-\n    # of its own\n  add"),
 }
 

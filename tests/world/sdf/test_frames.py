@@ -9,7 +9,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from ddenv.world.pose import Pose
 from tests.world.sdf.conftest import BOX, world_text
 
-INERTIAL = "<inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>"
+INERTIAL = (
+    "<inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>"
+)
 
 FRAMES = {
     "link after link": (
@@ -58,7 +60,9 @@ def test_links_are_where_drake_has_them(read, inside):
     for model in read(inside).models:
         for link in model.links:
             *scope, own = link.name.split("::")
-            body = plant.GetBodyByName(own, plant.GetModelInstanceByName("::".join((model.name, *scope))))
+            body = plant.GetBodyByName(
+                own, plant.GetModelInstanceByName("::".join((model.name, *scope)))
+            )
             there = plant.EvalBodyPoseInWorld(context, body)
             assert link.pose.position == pytest.approx(there.translation().tolist(), abs=1e-9)
             assert link.pose.rotation() == pytest.approx(there.rotation().matrix(), abs=1e-9)
@@ -107,7 +111,10 @@ def test_old_joint_axes_are_in_the_frame_of_the_model(read):
 
 def test_rows_of_frames_may_be_long(read):
     frames = "".join(
-        f"<frame name='f{n}'><pose relative_to='f{n - 1}'>1 0 0 0 0 0</pose></frame>" for n in range(1, 3000)
+        f"<frame name='f{n}'><pose relative_to='f{n - 1}'>1 0 0 0 0 0</pose></frame>"
+        for n in range(1, 3000)
     )
-    world = read(f"<model name='m'><frame name='f0'/>{frames}<link name='a'><pose relative_to='f2999'/></link></model>")
+    world = read(
+        f"<model name='m'><frame name='f0'/>{frames}<link name='a'><pose relative_to='f2999'/></link></model>"
+    )
     assert world.models[0].links[0].pose.position == (2999, 0, 0)

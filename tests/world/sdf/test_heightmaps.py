@@ -45,7 +45,9 @@ def heights(world: World, x: list[float], y: list[float]) -> list[float]:
     [HEIGHTS, HEIGHTS.astype(np.uint16) * 256, np.dstack([HEIGHTS, *[HEIGHTS // 2] * 3])],
     ids=["8 bits", "16 bits", "colours"],
 )
-def test_the_brightest_pixel_is_as_high_as_the_heightmap_and_the_first_row_is_at_the_greatest_y(read, tmp_path, pixels):
+def test_the_brightest_pixel_is_as_high_as_the_heightmap_and_the_first_row_is_at_the_greatest_y(
+    read, tmp_path, pixels
+):
     (tmp_path / "hill.png").write_bytes(png(pixels))
     world = read(heightmap())
     assert heights(world, [-2, 0, 2, 2, 1], [1, 1, 1, -1, 0]) == pytest.approx([0, 2, 4, 10, 5.25])
@@ -59,7 +61,9 @@ def test_what_was_read_is_read_again_without_the_image(read, tmp_path):
     (tmp_path / "hill.png").unlink()
     again = parse_world(world.text, world.path, resources=Resources(world.resources))
     assert again.models == world.models
-    assert np.array_equal(again.models[0].collisions[0].shape.heights, world.models[0].collisions[0].shape.heights)
+    assert np.array_equal(
+        again.models[0].collisions[0].shape.heights, world.models[0].collisions[0].shape.heights
+    )
 
 
 def test_clean_sdf_has_its_triangles(read, tmp_path):
@@ -74,7 +78,10 @@ def test_clean_sdf_has_its_triangles(read, tmp_path):
 @pytest.mark.parametrize(
     ("content", "why"),
     [
-        (png(np.zeros((1, 1), np.uint8)), "has 1 x 1 pixels; a heightmap has 2 to 4097 along each side"),
+        (
+            png(np.zeros((1, 1), np.uint8)),
+            "has 1 x 1 pixels; a heightmap has 2 to 4097 along each side",
+        ),
         (png(np.zeros((2, 20_000), np.uint8)), "has 20000 x 2 pixels"),
         (b"no image", "is no image that can be read; use a PNG of 8 or 16 bits"),
         (b"", "is no image that can be read"),
@@ -102,7 +109,9 @@ def test_an_image_of_400_million_pixels_is_refused_before_it_is_decoded(read, tm
         read(heightmap())
 
 
-def surface(height: Callable[[np.ndarray, np.ndarray], np.ndarray], count: int = 61) -> trimesh.Trimesh:
+def surface(
+    height: Callable[[np.ndarray, np.ndarray], np.ndarray], count: int = 61
+) -> trimesh.Trimesh:
     """A mesh of 20 x 12 m that each vertical line meets once, its vertices at random places."""
     random = np.random.default_rng(1)
     along, across = np.linspace(0, 20, count), np.linspace(0, 12, count)
@@ -110,9 +119,16 @@ def surface(height: Callable[[np.ndarray, np.ndarray], np.ndarray], count: int =
     x[:, 1:-1] += random.uniform(-0.05, 0.05, x[:, 1:-1].shape)
     y[1:-1] += random.uniform(-0.05, 0.05, y[1:-1].shape)
     number = np.arange(count * count).reshape(count, count)
-    first, beside, above, across = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
+    first, beside, above, across = (
+        number[:-1, :-1],
+        number[:-1, 1:],
+        number[1:, :-1],
+        number[1:, 1:],
+    )
     faces = np.stack([first, beside, across, first, across, above], axis=-1).reshape(-1, 3)
-    return trimesh.Trimesh(np.column_stack([x.ravel(), y.ravel(), height(x, y).ravel()]), faces, process=False)
+    return trimesh.Trimesh(
+        np.column_stack([x.ravel(), y.ravel(), height(x, y).ravel()]), faces, process=False
+    )
 
 
 def hill(x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -28,7 +28,8 @@ def included(inside="", uri="model://table"):
 
 def test_a_model_is_found_in_the_model_path(read, table):
     world = read(
-        included() + included("<name>desk</name><pose>1 2 3 0 0 0</pose><static>0</static>"), model_path=(table,)
+        included() + included("<name>desk</name><pose>1 2 3 0 0 0</pose><static>0</static>"),
+        model_path=(table,),
     )
     first, second = world.models
     assert (first.name, first.pose.position, first.static) == ("table", (0, 0, 5), True)
@@ -45,7 +46,10 @@ def test_of_a_broken_model_config_nothing_but_a_note_is_left(read, table):
     world = read(included() + included("<name>desk</name>"), model_path=(table,))
     assert [model.name for model in world.models] == ["table", "desk"]
     (note,) = (note for note in world.notes if "model.config" in note.why)
-    assert "line 1, column 36: not well-formed XML: </model> closes <sdf> of line 1; model.sdf is taken" in note.why
+    assert (
+        "line 1, column 36: not well-formed XML: </model> closes <sdf> of line 1; model.sdf is taken"
+        in note.why
+    )
     # What a run file stores says it, too.
     again = parse_world(world.text, world.path, resources=Resources(world.resources))
     assert again.notes == world.notes
@@ -61,15 +65,23 @@ def test_a_mesh_that_was_found_is_called_unreadable_and_no_folder_is_asked_for(r
     with pytest.raises(UserError) as refused:
         read(f"<model name='m'><link name='l'>{meshes}</link></model>")
     said = str(refused.value)
-    assert "'broken.dae' is unreadable: is not a valid DAE file: has no scene; give a shape in m" in said
+    assert (
+        "'broken.dae' is unreadable: is not a valid DAE file: has no scene; give a shape in m"
+        in said
+    )
     assert "--model-path" not in said
     assert said.endswith("; also missing: 'gone.dae'")
-    world = read(f"<model name='m'><static>1</static><link name='l'>{meshes}</link></model>", ignore=("mesh",))
+    world = read(
+        f"<model name='m'><static>1</static><link name='l'>{meshes}</link></model>",
+        ignore=("mesh",),
+    )
     assert any("'broken.dae' is unreadable (" in note.why for note in world.notes)
     assert any("'gone.dae' is not available (" in note.why for note in world.notes)
 
 
-@pytest.mark.parametrize(("of_model", "of_include"), [(" placement_frame='foot'", ""), ("", "foot")])
+@pytest.mark.parametrize(
+    ("of_model", "of_include"), [(" placement_frame='foot'", ""), ("", "foot")]
+)
 def test_the_place_of_an_include_can_be_that_of_a_frame_inside(read, table, of_model, of_include):
     frame = "<frame name='foot'><pose>0 0 -1 0 0 0</pose></frame>"
     text = TABLE.replace("<model name='table'>", f"<model name='table'{of_model}>{frame}")
@@ -115,7 +127,10 @@ def test_a_model_that_is_fixed_to_the_world_is_static(read, inside):
 def test_the_parts_of_a_static_model_in_another_one_can_be_removed(read):
     boxes = "".join(BOX.replace("'c'", f"'{name}'") for name in "ab")
     walls = f"<model name='walls'><static>1</static><link name='l'>{boxes}</link></model>"
-    assert read(f"<model name='house'>{walls}</model>", inside=True).elements() == ("house/a", "house/b")
+    assert read(f"<model name='house'>{walls}</model>", inside=True).elements() == (
+        "house/a",
+        "house/b",
+    )
 
 
 def test_the_links_of_a_merged_model_are_those_of_the_model_around_it(read, table):
@@ -126,9 +141,15 @@ def test_the_links_of_a_merged_model_are_those_of_the_model_around_it(read, tabl
     merged = "<include merge='true'><uri>model://table</uri><pose>0 1 0 0 0 0</pose></include>"
     own = f"<link name='c'><pose relative_to='tip'>1 0 0 0 0 0</pose>{BOX}</link>"
     joint = "<joint name='k' type='fixed'><parent>b</parent><child>c</child></joint>"
-    world = read(f"<model name='m'><pose>5 0 0 0 0 0</pose>{merged}{own}{joint}</model>", model_path=(table,))
+    world = read(
+        f"<model name='m'><pose>5 0 0 0 0 0</pose>{merged}{own}{joint}</model>", model_path=(table,)
+    )
     (model,) = world.models
-    assert {link.name: link.pose.position for link in model.links} == {"a": (5, 1, 0), "b": (5, 1, 0), "c": (6, 1, 2)}
+    assert {link.name: link.pose.position for link in model.links} == {
+        "a": (5, 1, 0),
+        "b": (5, 1, 0),
+        "c": (6, 1, 2),
+    }
     assert [(one.parent, one.child) for one in model.joints] == [("b", "c")]
     assert not model.static
 
@@ -154,7 +175,8 @@ def test_a_model_that_is_nowhere_is_refused_with_the_remedies(read):
     with pytest.raises(UserError, match="/world/include: 'model://table' was not found") as caught:
         read(included())
     assert all(
-        word in str(caught.value) for word in ("--model-path", "--stand-in 'model://table=box", "--ignore include")
+        word in str(caught.value)
+        for word in ("--model-path", "--stand-in 'model://table=box", "--ignore include")
     )
 
 
@@ -167,12 +189,17 @@ def test_a_stand_in_for_a_whole_model(read):
     assert desk.collisions[0].pose.position == (1, 0, 1)
     assert "stand-in cylinder:0.5,2" in world.notes[0].why
     assert read(included(), ignore=("include",)).models == ()
-    assert read("<include merge='true'><uri>model://table</uri></include>", ignore=("include",)).models == ()
+    assert (
+        read("<include merge='true'><uri>model://table</uri></include>", ignore=("include",)).models
+        == ()
+    )
 
 
 def test_what_is_wrong_in_an_included_file_is_told_of_that_file(read, table):
     (table / "table" / "model.sdf").write_text(TABLE.replace("0 0 5", "0 0 nan"))
-    with pytest.raises(UserError, match=r"table/model\.sdf:1: /sdf/model\[@name='table'\]/pose: expected 6 finite"):
+    with pytest.raises(
+        UserError, match=r"table/model\.sdf:1: /sdf/model\[@name='table'\]/pose: expected 6 finite"
+    ):
         read(included(), model_path=(table,))
 
 
@@ -183,7 +210,9 @@ def test_a_world_in_a_world_is_refused(read, table):
 
 
 def test_lights_and_actors_are_passed_over(read, table):
-    (table / "sun.sdf").write_text("<sdf version='1.7'><light name='sun' type='directional'/></sdf>")
+    (table / "sun.sdf").write_text(
+        "<sdf version='1.7'><light name='sun' type='directional'/></sdf>"
+    )
     world = read(included(uri="models/sun.sdf") + "<light name='l'/><actor name='walker'/>")
     assert world.models == ()
     assert sorted(note.what for note in world.notes) == ["<actor>", "<include>"]
@@ -206,20 +235,33 @@ def test_a_ground_that_could_move_does_not(read):
 def test_gravity_of_old_and_new_files(read):
     assert read("").gravity == (0, 0, -9.8)
     assert read("<gravity>0 0 -1.6</gravity>").gravity == (0, 0, -1.6)
-    assert read("<physics type='ode'><gravity>0 0 -3.7</gravity></physics>", "1.4").gravity == (0, 0, -3.7)
+    assert read("<physics type='ode'><gravity>0 0 -3.7</gravity></physics>", "1.4").gravity == (
+        0,
+        0,
+        -3.7,
+    )
     light = read("<model name='m'><link name='l'><gravity>0</gravity></link></model>").models[0]
     assert not light.gravity
 
 
 def test_all_files_that_are_nowhere_are_told_at_once(read):
     mesh = "<collision name='c'><geometry><mesh><uri>model://lamp/lamp.dae</uri></mesh></geometry></collision>"
-    with pytest.raises(UserError, match=r"'model://table' was not found: .*; also missing: 'model://lamp/lamp.dae'$"):
-        read(included() + included() + f"<model name='lamp'><static>1</static><link name='l'>{mesh}</link></model>")
+    with pytest.raises(
+        UserError,
+        match=r"'model://table' was not found: .*; also missing: 'model://lamp/lamp.dae'$",
+    ):
+        read(
+            included()
+            + included()
+            + f"<model name='lamp'><static>1</static><link name='l'>{mesh}</link></model>"
+        )
 
 
 def test_a_stand_in_is_called_as_what_it_replaces(read):
     uris = ("model://table", "https://fuel.gazebosim.org/1.0/Open/models/Construction%20Barrel")
-    world = read("".join(included(uri=uri) for uri in uris), stand_ins=dict.fromkeys(uris, "sphere:1"))
+    world = read(
+        "".join(included(uri=uri) for uri in uris), stand_ins=dict.fromkeys(uris, "sphere:1")
+    )
     assert [model.name for model in world.models] == ["table", "Construction Barrel"]
     assert [note.model for note in world.notes] == ["table", "Construction Barrel"]
 
@@ -254,12 +296,15 @@ SILENT = {
 @pytest.mark.parametrize("text", SILENT.values(), ids=SILENT.keys())
 def test_what_is_not_simulated_is_noted(read, text):
     text = text.format(
-        ends="<parent>a</parent><child>b</child>", box="<geometry><box><size>1 1 1</size></box></geometry>"
+        ends="<parent>a</parent><child>b</child>",
+        box="<geometry><box><size>1 1 1</size></box></geometry>",
     )
     mass = "<inertial><mass>1</mass><inertia/></inertial>"
     inside = "" if text.startswith("<joint") else text
     first = f"<link name='a'>{inside if '<inertial' in inside else mass + inside}</link>"
-    world = read(f"<model name='m'>{first}<link name='b'>{mass}</link>{'' if inside else text}</model>")
+    world = read(
+        f"<model name='m'>{first}<link name='b'>{mass}</link>{'' if inside else text}</model>"
+    )
     assert any(note.kind == "ignored" for note in world.notes)
 
 
@@ -283,9 +328,14 @@ def test_a_missing_file_is_told_before_what_follows_from_it(read):
 def test_a_model_of_which_all_is_left_out_is_left_out(read):
     lamp = "<model name='lamp'><static>1</static><link name='l'/></model>"
     wrapped = f"<model name='wall'>{included()}<model name='inner'>{included()}</model></model>"
-    world = read(wrapped + f"<model name='half'>{included()}{lamp}</model>", stand_ins={"model://table": "none"})
+    world = read(
+        wrapped + f"<model name='half'>{included()}{lamp}</model>",
+        stand_ins={"model://table": "none"},
+    )
     assert [model.name for model in world.models] == ["half"]
-    assert "all that it includes is left out" in [note.why for note in world.notes if note.model == "wall"]
+    assert "all that it includes is left out" in [
+        note.why for note in world.notes if note.model == "wall"
+    ]
     with pytest.raises(UserError, match="has no <link>"):
         read("<model name='m'><plugin name='p' filename='f'/></model>")
 
@@ -293,7 +343,9 @@ def test_a_model_of_which_all_is_left_out_is_left_out(read):
 def test_actors_are_not_simulated_and_nothing_else_is_said_of_them(read, table):
     (table / "table" / "model.sdf").write_text("<sdf version='1.6'><actor name='walker'/></sdf>")
     # An actor may have links, which could be touched.
-    world = read(f"{included()}<actor name='a'><link name='l'>{BOX}</link></actor>", model_path=(table,))
+    world = read(
+        f"{included()}<actor name='a'><link name='l'>{BOX}</link></actor>", model_path=(table,)
+    )
     assert world.models == ()
     assert [(note.what, note.why) for note in world.notes] == [
         ("<actor>", "actors are not simulated"),

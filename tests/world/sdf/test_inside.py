@@ -34,7 +34,11 @@ DITCH = read_world(SDF / "worlds" / "ditch.sdf", Reading(inside=True))
 def test_parts_are_named_by_model_link_and_collision_and_have_the_nearest_visuals(read):
     world = read(house(ROOMS), inside=True)
     assert world.elements() == ("house/walls/a", "house/walls/b", "house/shed/roof")
-    assert [[one.name for one in model.links[0].visuals] for model in world.models] == [["a_shown"], ["b_shown"], []]
+    assert [[one.name for one in model.links[0].visuals] for model in world.models] == [
+        ["a_shown"],
+        ["b_shown"],
+        [],
+    ]
     assert world.elements(frozenset({"house"})) == ()
 
 
@@ -49,7 +53,9 @@ def test_parts_are_named_by_model_link_and_collision_and_have_the_nearest_visual
 def test_links_and_nested_models_go_with_their_last_part(read, removed, left):
     world = read(house(ROOMS), inside=True)
     text = without(world, frozenset(removed)).decode()
-    for kind, name in (words.split() for words in ("collision a", "visual a_shown", "collision b", "collision c")):
+    for kind, name in (
+        words.split() for words in ("collision a", "visual a_shown", "collision b", "collision c")
+    ):
         assert (f"<{kind} name='{name}'>" in text) == (f"{kind} {name}" in left)
     assert ("'walls'" in text) == any(name in ("collision a", "collision b") for name in left)
     assert ("'shed'" in text) == ("collision c" in left)
@@ -57,9 +63,15 @@ def test_links_and_nested_models_go_with_their_last_part(read, removed, left):
 
 def test_a_model_goes_with_its_last_part(read):
     world = read(
-        f"{house(ROOMS)}<model name='box'><link name='l'>{shape('collision', 'd')}</link></model>", inside=True
+        f"{house(ROOMS)}<model name='box'><link name='l'>{shape('collision', 'd')}</link></model>",
+        inside=True,
     )
-    assert "house" not in without(world, frozenset(name for name in world.elements() if name != "box")).decode()
+    assert (
+        "house"
+        not in without(
+            world, frozenset(name for name in world.elements() if name != "box")
+        ).decode()
+    )
 
 
 @pytest.mark.parametrize(
@@ -136,17 +148,32 @@ HUTS = (
 def test_included_models_are_copied_and_opened(read, models):
     whole, world = read(HUTS, model_path=models), read(HUTS, model_path=models, inside=True)
     assert not [note for note in world.notes if note.what == "--inside"]
-    named = {name: [part for part in world.models if part.inside == name] for name in ("a&b", "yard")}
+    named = {
+        name: [part for part in world.models if part.inside == name] for name in ("a&b", "yard")
+    }
     assert [part.name for part in named["a&b"]] == [
-        *("a&b/walls/a", "a&b/walls/b", "a&b/chimney", "a&b/shed/roof", "a&b/porch/post/p", "a&b/porch/post/q"),
+        *(
+            "a&b/walls/a",
+            "a&b/walls/b",
+            "a&b/chimney",
+            "a&b/shed/roof",
+            "a&b/porch/post/p",
+            "a&b/porch/post/q",
+        ),
     ]
     for model in whole.models:
         parts = [one for part in named[model.name] for one in part.collisions]
-        assert [(one.pose, one.mu) for one in parts] == [(one.pose, one.mu) for one in model.collisions]
+        assert [(one.pose, one.mu) for one in parts] == [
+            (one.pose, one.mu) for one in model.collisions
+        ]
 
 
-@pytest.mark.parametrize("removed", [(), ("a&b/chimney",), ("a&b/walls/a", "a&b/porch/post/p", "yard/hut/chimney")])
-def test_what_is_left_of_an_included_model_reads_alike_with_and_without_the_files(read, models, removed):
+@pytest.mark.parametrize(
+    "removed", [(), ("a&b/chimney",), ("a&b/walls/a", "a&b/porch/post/p", "yard/hut/chimney")]
+)
+def test_what_is_left_of_an_included_model_reads_alike_with_and_without_the_files(
+    read, models, removed
+):
     world = read(HUTS, model_path=models, inside=True)
     text = without(world, frozenset(removed))
     left = [one for model in world.models if model.name not in removed for one in model.collisions]
@@ -156,7 +183,9 @@ def test_what_is_left_of_an_included_model_reads_alike_with_and_without_the_file
 
 
 def test_what_cannot_be_copied_stays_whole_and_is_noted(read, models):
-    world = read(include("model://shed/shed.urdf") + include("model://hut"), model_path=models, inside=True)
+    world = read(
+        include("model://shed/shed.urdf") + include("model://hut"), model_path=models, inside=True
+    )
     (note,) = [note for note in world.notes if note.what == "--inside"]
     assert note.model == "shed"
     assert "ddenv world convert" in note.why
@@ -166,7 +195,9 @@ def test_what_cannot_be_copied_stays_whole_and_is_noted(read, models):
 def test_a_large_file_is_not_copied_again_and_again(read, models, monkeypatch):
     monkeypatch.setattr(inside, "MOST_COPIED", 2000)
     world = read(
-        "".join(include("model://hut", f"<name>{name}</name>") for name in "abc"), model_path=models, inside=True
+        "".join(include("model://hut", f"<name>{name}</name>") for name in "abc"),
+        model_path=models,
+        inside=True,
     )
     assert world.elements() == ("a", "b", "c")
     assert len(world.text) < 1000
@@ -180,13 +211,18 @@ def test_what_is_left_of_a_real_world_reads_as_before(removed):
 
 
 L = "0 0", "2 0", "2 1", "1 1", "1 2", "0 2"
-CORNER = f"<polyline><height>1</height>{''.join(f'<point>{point}</point>' for point in L)}</polyline>"
+CORNER = (
+    f"<polyline><height>1</height>{''.join(f'<point>{point}</point>' for point in L)}</polyline>"
+)
 
 
 def test_the_pieces_of_one_collision_are_one_part(read):
     wall = f"<collision name='wall'><geometry>{CORNER}</geometry></collision>"
     world = read(house(f"<link name='l'>{shape('collision', 'box')}{wall}</link>"), inside=True)
-    assert [(model.name, len(model.collisions)) for model in world.models] == [("house/box", 1), ("house/wall", 2)]
+    assert [(model.name, len(model.collisions)) for model in world.models] == [
+        ("house/box", 1),
+        ("house/wall", 2),
+    ]
     whole = read(house(f"<link name='l'>{wall}</link>"), inside=True)
     assert [model.name for model in whole.models] == ["house"]
     assert any("'ddenv world convert' writes its pieces" in note.why for note in whole.notes)

@@ -42,9 +42,7 @@ def test_a_joint_without_an_axis_turns_about_its_own_z(read):
 
 @pytest.mark.parametrize(("offset", "kind", "mu"), [(0.0, "fixed", 0.0), (0.01, "ball", 1.0)])
 def test_a_caster_ball_slides_in_place_of_rolling(read, offset, kind, mu):
-    ball = (
-        f"<collision name='s'><pose>{offset} 0 0 0 0 0</pose><geometry><sphere><radius>0.1</radius></sphere></geometry>"
-    )
+    ball = f"<collision name='s'><pose>{offset} 0 0 0 0 0</pose><geometry><sphere><radius>0.1</radius></sphere></geometry>"
     links = LINKS.replace("<link name='b'>", f"<link name='b'>{ball}</collision>")
     world = read(f"<model name='m'>{links}{joint('ball')}</model>")
     (model,) = world.models
@@ -53,7 +51,9 @@ def test_a_caster_ball_slides_in_place_of_rolling(read, offset, kind, mu):
 
 
 def test_a_universal_joint_has_two_axes_at_right_angles(read):
-    (one,) = joints_of(read, joint("universal", "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 3 0</xyz></axis2>"))
+    (one,) = joints_of(
+        read, joint("universal", "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 3 0</xyz></axis2>")
+    )
     assert (one.axis, one.axis2) == ((1, 0, 0), (0, 1, 0))
 
 
@@ -61,7 +61,10 @@ def test_ends_may_be_frames_and_links_of_nested_models(read):
     frame = "<frame name='f' attached_to='a'/>"
     inner = f"<model name='in'><link name='x'>{MASS}</link></model>"
     first, second = joints_of(
-        read, joint("fixed", parent="f"), joint("fixed", parent="b", child="in", name="k"), more=frame + inner
+        read,
+        joint("fixed", parent="f"),
+        joint("fixed", parent="b", child="in", name="k"),
+        more=frame + inner,
     )
     assert (first.parent, first.child) == ("a", "b")
     assert (second.parent, second.child) == ("b", "in::x")
@@ -72,7 +75,13 @@ def test_limits_and_damping(read, unlimited):
     limit = f"<lower>-1</lower><upper>{unlimited}</upper><effort>-1</effort><velocity>2</velocity>"
     inside = f"<axis><limit>{limit}</limit><dynamics><damping>0.5</damping></dynamics></axis>"
     (one,) = joints_of(read, joint("revolute", inside))
-    assert (one.lower, one.upper, one.effort, one.velocity, one.damping) == (-1, math.inf, math.inf, 2, 0.5)
+    assert (one.lower, one.upper, one.effort, one.velocity, one.damping) == (
+        -1,
+        math.inf,
+        math.inf,
+        2,
+        0.5,
+    )
 
 
 def test_unknown_joints_are_left_out_where_the_user_says_so(read):
@@ -101,7 +110,9 @@ def test_solids_have_the_inertia_that_drake_gives_them(shape, drake):
 
 def test_a_hull_has_the_inertia_of_what_it_holds():
     box = trimesh.creation.box((1, 2, 3))
-    volume, center, unit = solid(Mesh("box", box.vertices + np.array([5, 6, 7]), np.array(box.faces)))
+    volume, center, unit = solid(
+        Mesh("box", box.vertices + np.array([5, 6, 7]), np.array(box.faces))
+    )
     assert volume == pytest.approx(6)
     assert center == pytest.approx((5, 6, 7))
     assert unit == pytest.approx(solid(Box((1, 2, 3)))[2])
@@ -109,12 +120,18 @@ def test_a_hull_has_the_inertia_of_what_it_holds():
 
 def moving(inertial, tag="model"):
     shape = "<collision name='c'><pose>0 0 1 0 0 0</pose><geometry><box><size>1 2 3</size></box></geometry></collision>"
-    return f"<{tag} name='m'><link name='l'><pose>4 0 0 0 0 0</pose>{inertial}{shape}</link></{tag}>"
+    return (
+        f"<{tag} name='m'><link name='l'><pose>4 0 0 0 0 0</pose>{inertial}{shape}</link></{tag}>"
+    )
 
 
 REPLACED = {
     "absent": ("", 1.0, "no <inertial>: 1 kg"),
-    "nan": ("<inertial><mass>2</mass><inertia><ixx>nan</ixx></inertia></inertial>", 2.0, "moments nan 1 1 kg m"),
+    "nan": (
+        "<inertial><mass>2</mass><inertia><ixx>nan</ixx></inertia></inertial>",
+        2.0,
+        "moments nan 1 1 kg m",
+    ),
     "impossible": (
         "<inertial><mass>3</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>9</izz></inertia></inertial>",
         3.0,
@@ -127,7 +144,9 @@ REPLACED = {
 
 
 @pytest.mark.parametrize(("inertial", "mass", "why"), REPLACED.values(), ids=REPLACED.keys())
-def test_an_inertia_that_cannot_be_is_worked_out_from_the_shapes_with_a_note(read, inertial, mass, why):
+def test_an_inertia_that_cannot_be_is_worked_out_from_the_shapes_with_a_note(
+    read, inertial, mass, why
+):
     world = read(moving(inertial))
     inertia = world.models[0].links[0].inertia
     assert inertia.mass == pytest.approx(mass)
@@ -143,9 +162,7 @@ def test_automatic_inertia_uses_the_density_or_spreads_a_mass(read, given, mass)
 
 
 def test_two_shapes_share_one_inertia(read):
-    half = (
-        "<collision name='{0}'><pose>{1} 0 0 0 0 0</pose><geometry><box><size>1 1 1</size></box></geometry></collision>"
-    )
+    half = "<collision name='{0}'><pose>{1} 0 0 0 0 0</pose><geometry><box><size>1 1 1</size></box></geometry></collision>"
     link = f"<link name='l'>{half.format('a', -0.5)}{half.format('b', 0.5)}</link>"
     inertia = read(f"<model name='m'>{link}</model>").models[0].links[0].inertia
     assert inertia.moments == pytest.approx((1 / 6, 5 / 12, 5 / 12))
@@ -163,7 +180,11 @@ def test_two_shapes_share_one_inertia(read):
 def test_a_joint_that_was_saved_beyond_half_a_turn_is_within_its_limits(read, limits, angle, left):
     limit = f"<axis><xyz>0 0 1</xyz><limit><lower>{limits[0]}</lower><upper>{limits[1]}</upper></limit></axis>"
     state = f"<state><model name='m'><link name='b'><pose>0 0 1 0 0 {angle}</pose></link></model></state>"
-    (one,) = read(f"<model name='m'>{LINKS}{joint('revolute', limit)}</model>{state}", "1.6").models[0].joints
+    (one,) = (
+        read(f"<model name='m'>{LINKS}{joint('revolute', limit)}</model>{state}", "1.6")
+        .models[0]
+        .joints
+    )
     assert (one.lower, one.upper) == pytest.approx(left)
 
 
@@ -171,4 +192,6 @@ def test_a_thin_plate_in_round_figures_is_kept(read):
     plate = "<inertia><ixx>0.083333</ixx><iyy>0.083333</iyy><izz>0.166667</izz></inertia>"
     world = read(moving(f"<inertial><mass>1</mass>{plate}</inertial>"))
     assert world.notes == ()
-    assert world.models[0].links[0].inertia.moments == pytest.approx((0.083333, 0.083333, 0.166667), rel=1e-4)
+    assert world.models[0].links[0].inertia.moments == pytest.approx(
+        (0.083333, 0.083333, 0.166667), rel=1e-4
+    )

@@ -29,11 +29,15 @@ def test_sun_and_ground_plane_are_built_in(read, tmp_path, sun, ground):
     (collision,) = plane.collisions
     assert isinstance(collision.shape, Plane)
     assert (collision.mu, collision.pose.position) == (50, (0, 0, 0.5))
-    assert {note.what: note.kind for note in world.notes if note.what == "<include>"} == {"<include>": "replaced"}
+    assert {note.what: note.kind for note in world.notes if note.what == "<include>"} == {
+        "<include>": "replaced"
+    }
     assert any("nothing can touch it" in note.why for note in world.notes)
     assert any("the one built into ddenv" in note.why for note in world.notes)
     assert (
-        parse_world(world_text(text), tmp_path / "here.sdf", resources=Resources(world.resources)).models
+        parse_world(
+            world_text(text), tmp_path / "here.sdf", resources=Resources(world.resources)
+        ).models
         == world.models
     )
 
@@ -66,7 +70,11 @@ def test_every_known_model_and_its_mesh_have_its_size(read, name):
     factors = MESH_SCALES.get(name, (1.0, 1.0, 1.0))
     scale = f"<scale>{' '.join(map(str, factors))}</scale>"
     whole = read(included(f"model://{name}"), stand_ins={"*": "auto"}).models[0]
-    mesh, note = guessed(read(lost(f"model://{name}/meshes/x.dae", scale=scale), stand_ins={f"model://{name}": "auto"}))
+    mesh, note = guessed(
+        read(
+            lost(f"model://{name}/meshes/x.dae", scale=scale), stand_ins={f"model://{name}": "auto"}
+        )
+    )
     assert mesh.shape == whole.collisions[0].shape
     assert mesh.pose == whole.collisions[0].pose
     assert f"by a guess, {text}: the size of Gazebo's model" in note
@@ -76,7 +84,9 @@ def test_every_known_model_and_its_mesh_have_its_size(read, name):
 
 def test_a_mesh_that_is_scaled_has_its_known_size_scaled(read):
     scale = "<scale>2 2 3</scale>"
-    collision, _ = guessed(read(lost("model://construction_barrel/x.dae", scale=scale), stand_ins={"*": "auto"}))
+    collision, _ = guessed(
+        read(lost("model://construction_barrel/x.dae", scale=scale), stand_ins={"*": "auto"})
+    )
     assert collision.shape == Cylinder(pytest.approx(0.592), pytest.approx(3.945))
 
 
@@ -110,7 +120,11 @@ DEFAULT = "<mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia>
 
 @pytest.mark.parametrize("inside", [*IMPOSSIBLE, DEFAULT])
 def test_auto_says_that_it_knows_nothing(read, inside):
-    text = lost("model://odd/x.dae", inside=f"<inertial>{inside}</inertial>", pose="<pose>0 0 1 0 0 0</pose>")
+    text = lost(
+        "model://odd/x.dae",
+        inside=f"<inertial>{inside}</inertial>",
+        pose="<pose>0 0 1 0 0 0</pose>",
+    )
     collision, note = guessed(read(text, stand_ins={"*": "auto"}))
     assert (collision.shape, collision.pose.position) == (Box((1, 1, 1)), (0, 0, 1.5))
     assert "by a guess, box:1,1,1: nothing says how large it is" in note
@@ -118,18 +132,29 @@ def test_auto_says_that_it_knows_nothing(read, inside):
 
 @pytest.mark.parametrize("name", ["FloorB_01", "my_ground_plane", "Terrain%20map"])
 def test_auto_puts_no_box_where_a_floor_would_be(read, name):
-    for text in (included(f"model://{name}"), lost(f"model://{name}/x.dae"), lost(f"model://hall/{name}.dae")):
+    for text in (
+        included(f"model://{name}"),
+        lost(f"model://{name}/x.dae"),
+        lost(f"model://hall/{name}.dae"),
+    ):
         world = read(text, stand_ins={"*": "auto"})
         assert not any(model.collisions for model in world.models)
-        assert any("is left out: a floor of unknown size is not guessed" in note.why for note in world.notes)
+        assert any(
+            "is left out: a floor of unknown size is not guessed" in note.why
+            for note in world.notes
+        )
     seen = "<visual name='v'><geometry><box><size>8 8 0.1</size></box></geometry></visual>"
-    collision, _ = guessed(read(lost(f"model://{name}/x.dae", inside=seen), stand_ins={"*": "auto"}))
+    collision, _ = guessed(
+        read(lost(f"model://{name}/x.dae", inside=seen), stand_ins={"*": "auto"})
+    )
     assert collision.shape == Box((8, 8, 0.1))
     assert read(lost("model://playground/x.dae"), stand_ins={"*": "auto"}).models[0].collisions
 
 
 def test_auto_leaves_what_is_there(read, tmp_path):
-    (tmp_path / "a.obj").write_text("v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 1 3 4\n")
+    (tmp_path / "a.obj").write_text(
+        "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 1 3 4\n"
+    )
     world = read(lost("a.obj"), stand_ins={"*": "auto", "a.obj": "auto"})
     assert tuple(model_bounds(world.models[0])[1]) == (2, 2, 2)
     assert [note.why for note in world.notes] == [
@@ -140,7 +165,8 @@ def test_auto_leaves_what_is_there(read, tmp_path):
 def test_one_uri_can_be_guessed_and_another_left_out(read):
     text = included("model://table") + included("model://odd") + lost("model://gone/x.dae")
     with pytest.raises(
-        UserError, match=r"'model://table'.*--stand-in auto.*; also missing: 'model://odd', 'model://gone/x.dae'"
+        UserError,
+        match=r"'model://table'.*--stand-in auto.*; also missing: 'model://odd', 'model://gone/x.dae'",
     ):
         read(text)
     world = read(text, stand_ins={"*": "auto", "model://odd": "none", "model://gone": "none"})
@@ -154,5 +180,7 @@ def test_one_uri_can_be_guessed_and_another_left_out(read):
 
 
 def test_only_auto_stands_for_all_that_is_missing(read):
-    with pytest.raises(UserError, match=r"stand-in for '\*': only auto can stand for all that is missing"):
+    with pytest.raises(
+        UserError, match=r"stand-in for '\*': only auto can stand for all that is missing"
+    ):
         read("", stand_ins={"*": "box:1,1,1"})

@@ -13,7 +13,9 @@ from ddenv.world.sdf.read import parse_world, read_world
 from tests.conftest import DATA
 
 BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
-INERTIAL = "<inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>"
+INERTIAL = (
+    "<inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>"
+)
 LINK = f"<link name='link'>{INERTIAL}{BOX}</link>"
 HINGE = (
     f"<link name='arm'><pose>0 0 1 0 0 0</pose>{INERTIAL}{BOX}</link>"
@@ -51,7 +53,8 @@ RIGID = [model.name for model in READ.models if len(model.links) == 1 and model.
 
 places = st.floats(-50, 50, allow_subnormal=False)
 angles = st.one_of(
-    st.floats(-3.2, 3.2, allow_subnormal=False), st.sampled_from([1.5707963267948966, -1.5707963267948966])
+    st.floats(-3.2, 3.2, allow_subnormal=False),
+    st.sampled_from([1.5707963267948966, -1.5707963267948966]),
 )
 poses = st.builds(Pose.from_rpy, places, places, places, angles, angles, angles)
 POSES = re.compile(rb"<pose[^>]*>[^<]*</pose>|<pose/>")
@@ -93,5 +96,7 @@ def test_what_cannot_be_moved_stays_and_is_named():
     again = parse_world(text, READ.path)
     assert again.model("arm").links == READ.model("arm").links
     assert again.model("follower").links == READ.model("follower").links
-    assert all(map(is_same, (link.pose for link in again.model("saved arm").links), bent["saved arm"]))
+    assert all(
+        map(is_same, (link.pose for link in again.model("saved arm").links), bent["saved arm"])
+    )
     assert is_same(again.model("plain").links[0].pose, lifted)

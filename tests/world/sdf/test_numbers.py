@@ -48,8 +48,12 @@ def test_each_number_of_a_world_can_be_changed_and_read_again(parts):
     scenario, world, robot = parts
     names = [model.name for model in world.models if model.name != "ground"]
     numbers = numbers_of(scenario, world, robot, names)
-    assert {"ball.mass", "none.friction", "ode.radius", "follower.x", "spawn.yaw", "goal.x"} <= set(numbers)
-    assert not [name for name in numbers if name.startswith(("ground.", "both.x", "lidar."))], "an anchor stays"
+    assert {"ball.mass", "none.friction", "ode.radius", "follower.x", "spawn.yaw", "goal.x"} <= set(
+        numbers
+    )
+    assert not [name for name in numbers if name.startswith(("ground.", "both.x", "lidar."))], (
+        "an anchor stays"
+    )
     for name, one in numbers.items():
         value = one.now + 0.37 * (one.high - one.now)
         there, after = changed(scenario, world, {name: value})
@@ -66,7 +70,9 @@ def test_each_number_of_a_world_can_be_changed_and_read_again(parts):
 def test_only_what_is_asked_for_changes_in_the_text(parts):
     scenario, world, _ = parts
     _, after = changed(scenario, world, {"both.friction": 0.05})
-    assert after.text == world.text.replace(b"<mu>1.0</mu><mu2>1</mu2>", b"<mu>0.05</mu><mu2>0.05</mu2>")
+    assert after.text == world.text.replace(
+        b"<mu>1.0</mu><mu2>1</mu2>", b"<mu>0.05</mu><mu2>0.05</mu2>"
+    )
     _, after = changed(scenario, world, {"surface.friction": 0.05})
     said = b"<surface><friction><ode><mu>0.05</mu><mu2>0.05</mu2></ode></friction></surface>"
     assert after.text == world.text.replace(b"<surface/>", said)
@@ -101,12 +107,18 @@ def test_values_that_are_not_possible_and_why(parts):
 def test_numbers_are_chosen_by_their_names(parts):
     scenario, world, robot = parts
     numbers = numbers_of(scenario, world, robot, ["ode", "bullet"])
-    assert [one.name for one in chosen(numbers, ["*.y"])] == ["ode.y", "bullet.y", "spawn.y", "goal.y"]
+    assert [one.name for one in chosen(numbers, ["*.y"])] == [
+        "ode.y",
+        "bullet.y",
+        "spawn.y",
+        "goal.y",
+    ]
     assert chosen(numbers, []) == list(numbers.values())
     # Those that promise most come first.
     assert next(iter(numbers)) == "ode.friction"
     with pytest.raises(
-        UserError, match=r"^--number: there is no number 'ode\.frictio' \(did you mean ode\.friction\?\)"
+        UserError,
+        match=r"^--number: there is no number 'ode\.frictio' \(did you mean ode\.friction\?\)",
     ):
         chosen(numbers, ["*.x", "ode.frictio"])
     assert all(dataclasses.astuple(one) for one in numbers.values())
@@ -114,7 +126,9 @@ def test_numbers_are_chosen_by_their_names(parts):
 
 def test_options_of_an_own_controller_are_numbers_too():
     scenario = load_scenario(find_scenario("friction"))
-    own = scenario.controller.model_copy(update={"use": "mine:Own", "options": {"gain": 2, "name": "a", "on": True}})
+    own = scenario.controller.model_copy(
+        update={"use": "mine:Own", "options": {"gain": 2, "name": "a", "on": True}}
+    )
     world, robot = load_parts(scenario)
     own_scenario = scenario.model_copy(update={"controller": own})
     numbers = numbers_of(own_scenario, world, robot, ["barrel_01"])

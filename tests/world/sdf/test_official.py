@@ -26,7 +26,9 @@ from ddenv.world.sdf.read import parse_world, read_world
 from ddenv.world.write import convert, without, write_converted
 from tests.conftest import DATA, ROOT
 
-SHIPPED = sorted(path for folder in ("sdf", "scenarios", "docs") for path in (ROOT / folder).rglob("*.[sw]*[df]"))
+SHIPPED = sorted(
+    path for folder in ("sdf", "scenarios", "docs") for path in (ROOT / folder).rglob("*.[sw]*[df]")
+)
 WORLDS = [path for path in SHIPPED if b"<world " in path.read_bytes()]
 ACCEPTED = "Valid."
 
@@ -58,7 +60,9 @@ def complaints(path, model_path=()):
 def official(tmp_path):
     """The checker's complaints of a file's text."""
     if shutil.which("ign") is None:
-        pytest.skip("needs the official SDF checker: apt-get install ignition-tools libsdformat-dev")
+        pytest.skip(
+            "needs the official SDF checker: apt-get install ignition-tools libsdformat-dev"
+        )
 
     def ask(text):
         path = tmp_path / "asked.sdf"
@@ -78,7 +82,10 @@ def model(name, parts, static=1):
 
 
 def inertia(*moments):
-    tags = "".join(f"<{tag}>{value}</{tag}>" for tag, value in zip(("ixx", "iyy", "izz", "ixy"), moments, strict=False))
+    tags = "".join(
+        f"<{tag}>{value}</{tag}>"
+        for tag, value in zip(("ixx", "iyy", "izz", "ixy"), moments, strict=False)
+    )
     return f"<inertial><mass>1</mass><inertia>{tags}</inertia></inertial>"
 
 
@@ -95,13 +102,20 @@ def test_what_the_official_checker_refuses_is_noted(tmp_path):
         "<light name='first' type='point'/><plugin name='second' filename='f'/>",
     ]
     world = parse_world(
-        "\n".join(["<sdf version='1.9'><world name='w'>", *inside, "</world></sdf>"]).encode(), tmp_path / "w.sdf"
+        "\n".join(["<sdf version='1.9'><world name='w'>", *inside, "</world></sdf>"]).encode(),
+        tmp_path / "w.sdf",
     )
-    found = [(entry["why"], entry["place"].split(":")[1]) for entry in world_report(world)["refused"]]
+    found = [
+        (entry["why"], entry["place"].split(":")[1]) for entry in world_report(world)["refused"]
+    ]
     twice = "a <{}> with two parts of the same name"
     assert Counter(found) == Counter(
         [
-            *((twice.format("link"), "2"), (twice.format("link"), "3"), (twice.format("world"), "9")),
+            *(
+                (twice.format("link"), "2"),
+                (twice.format("link"), "3"),
+                (twice.format("world"), "9"),
+            ),
             *(("an inertia that no body has", "4"), ("an inertia that no body has", "5")),
             *(("a name that is reserved", "7"), ("'::' in a name", "8")),
         ]
@@ -113,7 +127,9 @@ def test_what_the_official_checker_refuses_is_noted(tmp_path):
     assert not any("::" in why for why, _ in refused(parse_world(old, tmp_path / "old.sdf")))
 
 
-@pytest.mark.parametrize("path", [path for path in WORLDS if path.name != "ditch.sdf"], ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", [path for path in WORLDS if path.name != "ditch.sdf"], ids=lambda path: path.stem
+)
 def test_our_worlds_have_nothing_to_note(path):
     assert refused(read_world(path)) == []
 
@@ -150,7 +166,9 @@ def test_converted_and_minimal_worlds_are_valid(path, official, tmp_path):
 
 def generated(dice):
     """A world of boxes, frames, joints, nested models and lights; in two of three worlds some have odd names or moments."""
-    odd, impossible = dice.choice([([], 0), (["same", "same", "__odd__", "x::y"], 0), (["same"], 1)])
+    odd, impossible = dice.choice(
+        [([], 0), (["same", "same", "__odd__", "x::y"], 0), (["same"], 1)]
+    )
 
     def name(kind):
         plain = f"{kind} {dice.randrange(10**6)}"
@@ -158,16 +176,30 @@ def generated(dice):
 
     def link(own):
         tensor = dice.choice(
-            [(1, 1, 1), (0.1, 0.2, 0.25), (1, 1, 2), (1, 1, 1, 0.5)] + [(1, 1, 2.00001), (1, 1, 1, 2)] * impossible
+            [(1, 1, 1), (0.1, 0.2, 0.25), (1, 1, 2), (1, 1, 1, 0.5)]
+            + [(1, 1, 2.00001), (1, 1, 1, 2)] * impossible
         )
-        parts = [f"<{kind} name='{name(kind)}'>{BOX}</{kind}>" for kind in ("collision", "visual", "visual")]
+        parts = [
+            f"<{kind} name='{name(kind)}'>{BOX}</{kind}>"
+            for kind in ("collision", "visual", "visual")
+        ]
         return f"<link name='{own}'>{inertia(*tensor)}{''.join(parts[: dice.randrange(4)])}</link>"
 
     def one(own, depth=0):
-        joint = f"<joint name='{name('joint')}' type='fixed'><parent>k</parent><child>l</child></joint>"
+        joint = (
+            f"<joint name='{name('joint')}' type='fixed'><parent>k</parent><child>l</child></joint>"
+        )
         inner = one(name("inner"), depth + 1) if depth < 2 and dice.random() < 0.3 else ""
-        more = link("k") + joint if dice.random() < 0.5 else f"<frame name='{name('frame')}' attached_to='l'/>"
-        place = f" relative_to='{dice.choice(names)}'" if names and not depth and dice.random() < 0.3 else ""
+        more = (
+            link("k") + joint
+            if dice.random() < 0.5
+            else f"<frame name='{name('frame')}' attached_to='l'/>"
+        )
+        place = (
+            f" relative_to='{dice.choice(names)}'"
+            if names and not depth and dice.random() < 0.3
+            else ""
+        )
         static = dice.randrange(2)
         return f"<model name='{own}'><static>{static}</static><pose{place}>1 0 0 0 0 0</pose>{link('l')}{more}{inner}</model>"
 
@@ -176,7 +208,9 @@ def generated(dice):
         inside.append(one(f"model_{number}"))
         names.append(f"model_{number}")
     inside.append(f"<model name='{name('model')}'><static>1</static><link name='l'/></model>")
-    inside.append(f"<light name='{name('light')}' type='point'><pose relative_to='model_7'>0 0 1 0 0 0</pose></light>")
+    inside.append(
+        f"<light name='{name('light')}' type='point'><pose relative_to='model_7'>0 0 1 0 0 0</pose></light>"
+    )
     inside.append(f"<frame name='marked' attached_to='{dice.choice(names)}'/>")
     text = f"<sdf version='{dice.choice(['1.7', '1.8', '1.9'])}'><world name='w'>{''.join(inside)}</world></sdf>"
     return text.encode()
@@ -195,7 +229,9 @@ def test_generated_worlds_are_judged_as_foretold(official, tmp_path):
             assert bool(said) == bool(refused(each)), (seed, said, refused(each))
         valid += not refused(world)
         # The checker names only the first mistakes, so those of the smaller world are counted by what we foretell.
-        assert Counter(why for why, _ in refused(smaller)) <= Counter(why for why, _ in refused(world)), seed
+        assert Counter(why for why, _ in refused(smaller)) <= Counter(
+            why for why, _ in refused(world)
+        ), seed
         assert official(convert(world, "meshes")[0]) == Counter(), seed
     assert 5 <= valid <= 15
 
@@ -253,30 +289,44 @@ def included(tmp_path_factory):
     models = {"crate": ("box", ""), "twice": ("twice", same), "heavy": ("heavy", inertia(1, 1, 3))}
     for name, (own, parts) in models.items():
         (folder / name).mkdir()
-        (folder / name / "model.config").write_text("<model><sdf version='1.9'>model.sdf</sdf></model>")
-        (folder / name / "model.sdf").write_text(f"<sdf version='1.9'>{model(own, parts, static=0)}</sdf>")
+        (folder / name / "model.config").write_text(
+            "<model><sdf version='1.9'>model.sdf</sdf></model>"
+        )
+        (folder / name / "model.sdf").write_text(
+            f"<sdf version='1.9'>{model(own, parts, static=0)}</sdf>"
+        )
     return folder
 
 
 def made(inside, folder):
-    text = f"<sdf version='1.9'><world name='w'>{inside}</world></sdf>".replace("<uri>", "<uri>model://")
+    text = f"<sdf version='1.9'><world name='w'>{inside}</world></sdf>".replace(
+        "<uri>", "<uri>model://"
+    )
     return parse_world(text.encode(), folder / "made.sdf", Reading(model_path=(folder,)))
 
 
 @pytest.mark.parametrize("inside", JUDGED)
 def test_what_is_said_of_a_part(inside, included):
-    assert [why for why, _ in refused(made(inside, included))] == [JUDGED[inside]][: bool(JUDGED[inside])]
+    assert [why for why, _ in refused(made(inside, included))] == [JUDGED[inside]][
+        : bool(JUDGED[inside])
+    ]
 
 
 def test_what_is_said_of_an_included_file_points_into_it_once(included):
-    twice = "".join(f"<include><uri>twice</uri><name>n{number}</name></include>" for number in range(3))
+    twice = "".join(
+        f"<include><uri>twice</uri><name>n{number}</name></include>" for number in range(3)
+    )
     ((_, where),) = refused(made(twice, included))
     assert where.startswith(f"{included / 'twice' / 'model.sdf'}:1: /sdf/model[@name='twice']/link")
 
 
-@pytest.mark.parametrize("text", [b"<sdf version='1.9'><world/></sdf>", b"<sdf version='1.9'><world name=''/></sdf>"])
+@pytest.mark.parametrize(
+    "text", [b"<sdf version='1.9'><world/></sdf>", b"<sdf version='1.9'><world name=''/></sdf>"]
+)
 def test_a_world_without_a_name_is_noted(text, tmp_path):
-    assert [why for why, _ in refused(parse_world(text, tmp_path / "w.sdf"))] == ["a <world> without its name"]
+    assert [why for why, _ in refused(parse_world(text, tmp_path / "w.sdf"))] == [
+        "a <world> without its name"
+    ]
 
 
 @pytest.mark.programs
@@ -296,7 +346,9 @@ def test_the_table_of_known_elements_is_the_checker_s_own():
     for path in folder.glob("*.sdf"):
         for parent in ElementTree.parse(path).getroot().iter("element"):
             for child in parent.findall("element[@type]"):
-                described.setdefault((parent.get("name"), child.get("name")), set()).add(child.get("type"))
+                described.setdefault((parent.get("name"), child.get("name")), set()).add(
+                    child.get("type")
+                )
     same = {"unsigned int": "unsigned", "vector2d": "vector2", "string": ""}
     for (parent, tag), kinds in described.items():
         kind = known_children()[parent][tag].kind.replace("string", "")
@@ -304,7 +356,10 @@ def test_the_table_of_known_elements_is_the_checker_s_own():
     assert len(described) > 300
 
 
-PUBLIC = [ROOT.parent / "shared" / "repros" / "worlds", ROOT.parent / "shared" / "worlds" / "public" / "gz_examples"]
+PUBLIC = [
+    ROOT.parent / "shared" / "repros" / "worlds",
+    ROOT.parent / "shared" / "worlds" / "public" / "gz_examples",
+]
 WITH_A_WORLD = [
     path
     for folder in PUBLIC
@@ -314,7 +369,9 @@ WITH_A_WORLD = [
 
 
 @pytest.mark.programs
-@pytest.mark.parametrize("path", WITH_A_WORLD, ids=lambda path: f"{path.parent.name}-{path.stem}" if path else "none")
+@pytest.mark.parametrize(
+    "path", WITH_A_WORLD, ids=lambda path: f"{path.parent.name}-{path.stem}" if path else "none"
+)
 def test_public_worlds_are_judged_as_by_the_checker(path, official):
     if path is None:
         pytest.skip(

@@ -40,7 +40,9 @@ def test_primitives(read, geometry, shape):
 SDFORMAT = Path("/usr/share/sdformat12/1.9")
 
 
-@pytest.mark.skipif(not SDFORMAT.is_dir(), reason="libsdformat's descriptions are not on this machine")
+@pytest.mark.skipif(
+    not SDFORMAT.is_dir(), reason="libsdformat's descriptions are not on this machine"
+)
 @pytest.mark.parametrize(
     ("shape", "child"),
     [(shape, child) for shape, children in DEFAULT_SIZES.items() for child in children],
@@ -77,7 +79,11 @@ def outline(*corners):
         (outline((0, 0), (2, 0), (2, 1), (0, 1)), 6),
         (outline((0, 0), (2, 0), (2, 1), (1, 0.2), (0, 1)), 3.6),
         # A frame: the inner outline is a hole.
-        (outline((0, 0), (2, 0), (2, 1), (0, 1)) + outline((0.5, 0.2), (1.5, 0.2), (1.5, 0.8), (0.5, 0.8)), 4.2),
+        (
+            outline((0, 0), (2, 0), (2, 1), (0, 1))
+            + outline((0.5, 0.2), (1.5, 0.2), (1.5, 0.8), (0.5, 0.8)),
+            4.2,
+        ),
     ],
 )
 def test_polylines_stand_on_their_frame_with_their_notches_and_holes(read, outlines, volume):
@@ -96,16 +102,23 @@ def angle(tmp_path):
 
     def link(inside="", attributes=""):
         mesh = f"<mesh {attributes}><uri>angle.obj</uri><scale>1 1 -2</scale>{inside}</mesh>"
-        shown = "".join(f"<{tag} name='{tag}'><geometry>{mesh}</geometry></{tag}>" for tag in ("collision", "visual"))
+        shown = "".join(
+            f"<{tag} name='{tag}'><geometry>{mesh}</geometry></{tag}>"
+            for tag in ("collision", "visual")
+        )
         return f"<link name='l'>{shown}</link>"
 
     return link
 
 
-def test_meshes_are_convex_pieces_where_they_collide_and_themselves_where_they_are_seen(read, angle):
+def test_meshes_are_convex_pieces_where_they_collide_and_themselves_where_they_are_seen(
+    read, angle
+):
     world = read(f"<model name='m'><static>1</static>{angle()}</model>")
     found = world.models[0].links[0]
-    sizes = sorted(tuple(round(side, 5) for side in sorted(one.shape.size)) for one in found.collisions)
+    sizes = sorted(
+        tuple(round(side, 5) for side in sorted(one.shape.size)) for one in found.collisions
+    )
     assert sizes == [(1, 1, 2), (1, 2, 2)]
     assert {one.name for one in found.collisions} == {"collision"}
     low, high = around(shape_bounds(one.shape, one.pose) for one in found.collisions)
@@ -136,7 +149,9 @@ def test_meshes_are_convex_pieces_where_they_collide_and_themselves_where_they_a
     ],
     ids=["convex_hull", "reading", "one piece", "wheel"],
 )
-def test_a_mesh_is_its_hull_where_the_file_or_the_user_asks_for_that_or_where_it_is_a_wheel(read, angle, made):
+def test_a_mesh_is_its_hull_where_the_file_or_the_user_asks_for_that_or_where_it_is_a_wheel(
+    read, angle, made
+):
     inside, options = made(angle)
     world = read(f"<model name='m'>{inside}</model>", **options)
     [collision] = next(link for link in world.models[0].links if link.name == "l").collisions
@@ -152,7 +167,11 @@ def _extruded(outline, height):
     walls = [[i, (i + 1) % count, (i + 1) % count + count] for i in range(count)]
     walls += [[i, (i + 1) % count + count, i + count] for i in range(count)]
     fan = [[0, 1, 3], [1, 2, 3], [0, 3, 5], [3, 4, 5]]
-    faces = [*walls, *([a, c, b] for a, b, c in fan), *([a + count, b + count, c + count] for a, b, c in fan)]
+    faces = [
+        *walls,
+        *([a, c, b] for a, b, c in fan),
+        *([a + count, b + count, c + count] for a, b, c in fan),
+    ]
     return trimesh.Trimesh(np.vstack([low, low + np.array([0, 0, height])]), faces, process=False)
 
 
@@ -161,16 +180,24 @@ def test_a_collision_mesh_that_is_nowhere_is_refused_with_all_remedies(read):
         read(model("<mesh><uri>model://barrel/meshes/a.dae</uri></mesh>"))
     said = str(caught.value)
     assert "/geometry/mesh: mesh 'model://barrel/meshes/a.dae'" in said
-    assert "--model-path" in said and "--stand-in 'model://barrel=cylinder:0.3,1.0'" in said and "--ignore mesh" in said
+    assert (
+        "--model-path" in said
+        and "--stand-in 'model://barrel=cylinder:0.3,1.0'" in said
+        and "--ignore mesh" in said
+    )
 
 
 def test_a_stand_in_stands_on_the_frame_of_what_it_replaces(read):
-    barrel = model("<mesh><uri>model://barrel/meshes/a.dae</uri></mesh>", "<pose>0 0 2 0 0 0</pose>")
+    barrel = model(
+        "<mesh><uri>model://barrel/meshes/a.dae</uri></mesh>", "<pose>0 0 2 0 0 0</pose>"
+    )
     world = read(barrel, stand_ins={"model://barrel": "cylinder:0.3,1.0"})
     (collision,) = world.models[0].collisions
     assert collision.shape == Cylinder(0.3, 1.0)
     assert collision.pose.position == (0, 0, 2.5)
-    placed = read(barrel, stand_ins={"model://barrel/meshes": "box:1,2,3@1,0,0"}).models[0].collisions[0]
+    placed = (
+        read(barrel, stand_ins={"model://barrel/meshes": "box:1,2,3@1,0,0"}).models[0].collisions[0]
+    )
     assert placed.pose.position == (1, 0, 2)
 
 
@@ -178,9 +205,13 @@ def test_a_stand_in_stands_on_the_frame_of_what_it_replaces(read):
 def test_the_box_around_the_other_shapes_of_a_link_can_stand_in(read, kind):
     pose = "<pose>0 0 1 0 0 0</pose>"
     other = f"<{kind} name='o'>{pose}<geometry><cylinder><radius>0.5</radius><length>2</length></cylinder></geometry></{kind}>"
-    lost = f"<collision name='c'>{pose}<geometry><mesh><uri>a.dae</uri></mesh></geometry></collision>"
+    lost = (
+        f"<collision name='c'>{pose}<geometry><mesh><uri>a.dae</uri></mesh></geometry></collision>"
+    )
     text = f"<model name='m'><static>1</static><link name='l'>{lost}{other}</link></model>"
-    with pytest.raises(UserError, match=f"'a.dae={kind}' for the box around its link's {kind} shapes"):
+    with pytest.raises(
+        UserError, match=f"'a.dae={kind}' for the box around its link's {kind} shapes"
+    ):
         read(text)
     found = read(text, stand_ins={"a.dae": kind}).models[0].collisions[0]
     assert found.shape == Box((1, 1, 2))
@@ -201,17 +232,31 @@ NOTED = {
         model("<mesh><uri>a.obj</uri></mesh>", tag="visual"),
         "'a.obj' by its convex hull, since it is too fine to be drawn",
     ),
-    "a heightmap is ignored": (model("<heightmap><uri>file://hills.png</uri></heightmap>"), "left out by --ignore"),
-    "an image is ignored": (model("<image><uri>file://hills.png</uri></image>"), "left out by --ignore"),
-    "a bitmask of nothing": (touched("<collide_bitmask>0x00</collide_bitmask>"), "lets nothing touch it"),
-    "no contact": (touched("<collide_without_contact>1</collide_without_contact>"), "it collides without contact"),
+    "a heightmap is ignored": (
+        model("<heightmap><uri>file://hills.png</uri></heightmap>"),
+        "left out by --ignore",
+    ),
+    "an image is ignored": (
+        model("<image><uri>file://hills.png</uri></image>"),
+        "left out by --ignore",
+    ),
+    "a bitmask of nothing": (
+        touched("<collide_bitmask>0x00</collide_bitmask>"),
+        "lets nothing touch it",
+    ),
+    "no contact": (
+        touched("<collide_without_contact>1</collide_without_contact>"),
+        "it collides without contact",
+    ),
 }
 
 
 @pytest.mark.parametrize(("text", "why"), NOTED.values(), ids=NOTED)
 def test_what_is_left_out_or_replaced_is_noted(read, tmp_path, monkeypatch, text, why):
     monkeypatch.setattr("ddenv.world.files.meshes.MOST_DRAWN", 3)
-    (tmp_path / "a.obj").write_text("v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 1 3 4\n")
+    (tmp_path / "a.obj").write_text(
+        "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 1 3 4\n"
+    )
     world = read(text, ignore=("heightmap", "image"), stand_ins={"model://bariel": "sphere:1"})
     assert world.models[0].collisions == ()
     assert why in world.notes[0].why
@@ -249,7 +294,12 @@ def test_the_friction_of_drake_counts_before_that_of_gazebo(read, properties, mu
 COLORS = {
     "<material><diffuse>1 0 0 1</diffuse><ambient>0 1 0 1</ambient></material>": (1, 0, 0, 1),
     "<material><ambient>0 1 0 0</ambient></material>": (0, 1, 0, 1),
-    "<material><diffuse>0 0 1</diffuse></material><transparency>0.75</transparency>": (0, 0, 1, 0.25),
+    "<material><diffuse>0 0 1</diffuse></material><transparency>0.75</transparency>": (
+        0,
+        0,
+        1,
+        0.25,
+    ),
     "<material><script><name>Gazebo/Red</name></script></material>": (0.8, 0.1, 0.1, 1),
     "<material><script><name>My/Own</name></script></material>": None,
 }
@@ -262,7 +312,9 @@ def test_visuals_keep_their_colours(read, material, color):
 
 
 def test_a_cone_stands_on_its_base(read):
-    shape = shape_of(read(model("<cone><radius>1</radius><length>3</length></cone>", "", "collision")))
+    shape = shape_of(
+        read(model("<cone><radius>1</radius><length>3</length></cone>", "", "collision"))
+    )
     solid = trimesh.Trimesh(shape.vertices, shape.faces)
     assert solid.is_watertight and solid.volume == pytest.approx(np.pi, rel=0.01)
     assert shape.vertices[:, 2].max() == 1.5

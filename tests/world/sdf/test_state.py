@@ -8,7 +8,9 @@ from ddenv.world.model import Box
 from tests.world.sdf.conftest import BOX
 
 MODEL = f"<model name='m'><static>1</static><pose>9 9 9 0 0 0</pose><link name='l'><pose>1 0 0 0 0 0</pose>{BOX}</link></model>"
-INERTIAL = "<inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>"
+INERTIAL = (
+    "<inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>"
+)
 
 
 def state(inside):
@@ -24,12 +26,18 @@ def test_absolute_link_poses_win(read):
     assert model.collisions[0].pose.position == (4, 5, 6)
     assert model.collisions[0].pose.yaw() == pytest.approx(math.pi / 2)
     (note,) = world.notes
-    assert (note.kind, note.model, note.detail) == ("replaced", "m", f"{math.dist((10, 9, 9), (4, 5, 6)):.2f} m away")
+    assert (note.kind, note.model, note.detail) == (
+        "replaced",
+        "m",
+        f"{math.dist((10, 9, 9), (4, 5, 6)):.2f} m away",
+    )
 
 
 def test_links_that_are_not_named_move_with_their_model(read):
     saved = "<model name='m'><pose>1 2 3 0 0 1.5707963267948966</pose></model>"
-    assert read(MODEL + state(saved), "1.6").models[0].links[0].pose.position == pytest.approx((1, 3, 3))
+    assert read(MODEL + state(saved), "1.6").models[0].links[0].pose.position == pytest.approx(
+        (1, 3, 3)
+    )
 
 
 def test_scales_multiply_sizes_but_not_places(read):
@@ -43,7 +51,9 @@ def test_nested_models_are_saved_inside_theirs(read):
     nested = f"<model name='m'><link name='a'/><model name='in'><link name='b'>{BOX}</link></model></model>"
     inner = "<model name='in'><link name='b'><pose>7 7 7 0 0 0</pose></link></model>"
     saved = f"<model name='m'><pose>1 0 0 0 0 0</pose>{inner}</model>"
-    links = {link.name: link.pose.position for link in read(nested + state(saved), "1.6").models[0].links}
+    links = {
+        link.name: link.pose.position for link in read(nested + state(saved), "1.6").models[0].links
+    }
     assert links == {"a": (1, 0, 0), "in::b": (7, 7, 7)}
 
 
@@ -52,13 +62,20 @@ def test_models_of_one_name_take_their_entries_in_order(read):
         "<model name='m'><pose>1 0 0 0 0 0</pose></model><model name='m'><pose>2 0 0 0 0 0</pose></model>"
     )
     world = read(twice, "1.6")
-    assert [(model.name, model.pose.position[0]) for model in world.models] == [("m", 1), ("m #2", 2)]
+    assert [(model.name, model.pose.position[0]) for model in world.models] == [
+        ("m", 1),
+        ("m #2", 2),
+    ]
 
 
 def test_entries_for_what_is_not_there_are_noted(read):
     saved = "<model name='m'><link name='lnik'><pose>1 1 1 0 0 0</pose></link><model name='no'/></model><model name='ghost'/>"
     told = [note.why for note in read(MODEL + state(saved + "<light name='sun'/>"), "1.6").notes]
-    assert told == ["the model has no 'lnik'", "the model has no 'no'", "the world has no model 'ghost'"]
+    assert told == [
+        "the model has no 'lnik'",
+        "the model has no 'no'",
+        "the world has no model 'ghost'",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -78,7 +95,9 @@ def test_joint_limits_count_from_where_the_state_has_the_links(read, kind, turne
 
 def test_what_moved_when_it_was_saved_begins_at_rest(read):
     saved = "<model name='m'><link name='l'><pose>0 0 0 0 0 0</pose><velocity>1 0 0 0 0 0</velocity></link></model>"
-    assert "every run starts at rest" in [note.why for note in read(MODEL + state(saved), "1.6").notes]
+    assert "every run starts at rest" in [
+        note.why for note in read(MODEL + state(saved), "1.6").notes
+    ]
 
 
 def test_a_model_that_was_only_turned_is_noted(read):

@@ -41,7 +41,13 @@ def test_links_stand_where_the_joints_say_and_the_root_comes_first():
         link("wheel", WHEEL),
         link("base", BODY),
         link("arm", WHEEL),
-        joint("turn", "continuous", "base", "arm", '<origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/>'),
+        joint(
+            "turn",
+            "continuous",
+            "base",
+            "arm",
+            '<origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/>',
+        ),
         joint("roll", "continuous", "arm", "wheel", '<origin xyz="1 0 0.5"/><axis xyz="0 2 0"/>'),
     )
     assert [each.name for each in model.links] == ["base", "wheel", "arm"]
@@ -57,14 +63,20 @@ def test_links_stand_where_the_joints_say_and_the_root_comes_first():
 def test_mass_and_inertia():
     model = read(link("base", BODY))
     inertia = model.links[0].inertia
-    assert (inertia.mass, inertia.moments, inertia.products) == (5.0, (1.0, 2.0, 2.0), (0.1, 0.0, 0.0))
+    assert (inertia.mass, inertia.moments, inertia.products) == (
+        5.0,
+        (1.0, 2.0, 2.0),
+        (0.1, 0.0, 0.0),
+    )
     assert inertia.pose.position == (0.0, 0.0, 0.1)
     assert not model.static
 
 
 def test_links_without_mass_have_none():
     fixed = joint("up", "fixed", "footprint", "base") + joint("on", "fixed", "base", "camera")
-    camera = link("camera", '<inertial><mass value="0"/></inertial>' + shape('<sphere radius="0.1"/>'))
+    camera = link(
+        "camera", '<inertial><mass value="0"/></inertial>' + shape('<sphere radius="0.1"/>')
+    )
     model = read(link("footprint"), link("base", BODY), camera, fixed)
     assert [each.inertia is None for each in model.links] == [True, False, True]
     assert [each.kind for each in model.joints] == ["fixed", "fixed"]
@@ -111,7 +123,13 @@ def test_limits_effort_and_damping():
         joint("roll", "continuous", "a", "d", limit + '<mimic joint="slide"/>'),
     )
     slide, swing, roll = model.joints
-    assert (slide.lower, slide.upper, slide.effort, slide.velocity, slide.damping) == (-1, 2, 3, 4, 0.5)
+    assert (slide.lower, slide.upper, slide.effort, slide.velocity, slide.damping) == (
+        -1,
+        2,
+        3,
+        4,
+        0.5,
+    )
     assert (swing.lower, swing.upper) == (0.0, 0.0)
     assert (roll.lower, roll.upper, roll.effort) == (-float("inf"), float("inf"), 3.0)
 
@@ -120,16 +138,25 @@ def test_colours_of_visuals_by_name_or_their_own():
     visual = '<visual><geometry><box size="1 1 1"/></geometry>{}</visual>'
     own = visual.format('<material name="x"><color rgba="1 0 0 1"/></material>')
     named, bare = visual.format('<material name="green"/>'), visual.format("")
-    model = read(link("base", BODY + own + named + bare), '<material name="green"><color rgba="0 1 0 0.5"/></material>')
+    model = read(
+        link("base", BODY + own + named + bare),
+        '<material name="green"><color rgba="0 1 0 0.5"/></material>',
+    )
     assert [each.color for each in model.links[0].visuals] == [(1, 0, 0, 1), (0, 1, 0, 0.5), None]
 
 
 TRIANGLES = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 
 
-@pytest.mark.parametrize("name", ["wheel.obj", "package://cart/meshes/wheel.obj", "package://other/wheel.obj"])
+@pytest.mark.parametrize(
+    "name", ["wheel.obj", "package://cart/meshes/wheel.obj", "package://other/wheel.obj"]
+)
 def test_meshes_beside_the_file_in_its_package_and_in_the_model_path(tmp_path, name):
-    places = [tmp_path / "cart" / "urdf", tmp_path / "cart" / "meshes", tmp_path / "models" / "other"]
+    places = [
+        tmp_path / "cart" / "urdf",
+        tmp_path / "cart" / "meshes",
+        tmp_path / "models" / "other",
+    ]
     for place in places:
         place.mkdir(parents=True)
     kept = {"wheel.obj": places[0], "package://other/wheel.obj": places[2]}.get(name, places[1])
@@ -145,7 +172,8 @@ def test_meshes_beside_the_file_in_its_package_and_in_the_model_path(tmp_path, n
 def test_a_mesh_that_is_nowhere_may_be_stood_in_for():
     base = link("base", BODY + shape('<mesh filename="package://cart/wheel.dae"/>'))
     with pytest.raises(
-        UserError, match=r"robot.urdf:3: /robot\[@name='cart'\]/link.*'package://cart/wheel.dae' is not available"
+        UserError,
+        match=r"robot.urdf:3: /robot\[@name='cart'\]/link.*'package://cart/wheel.dae' is not available",
     ):
         read(base)
     model = read(base, reading=Reading(stand_ins={"package://cart": "cylinder:0.3,1.0"}))
@@ -170,24 +198,45 @@ REFUSED = {
         (link("c", WHEEL), A, B, J, joint("k", "fixed", "c", "b"), joint("l", "fixed", "a", "c")),
         "link 'b' is the child of two joints",
     ),
-    "planar": (moving("planar"), r":5: .*/joint\[@name='j'\]: joint type 'planar' is not supported"),
+    "planar": (
+        moving("planar"),
+        r":5: .*/joint\[@name='j'\]: joint type 'planar' is not supported",
+    ),
     "floating": (moving("floating"), "joint type 'floating' is not supported"),
-    "unknown link": (moving("fixed", child="bb"), r"/child: there is no link 'bb' \(did you mean b\?\)"),
+    "unknown link": (
+        moving("fixed", child="bb"),
+        r"/child: there is no link 'bb' \(did you mean b\?\)",
+    ),
     "no end": ((A, B, '<joint name="j" type="fixed"><parent link="a"/></joint>'), "has no <child>"),
     "no limit": (moving("revolute"), "a revolute joint needs a <limit>"),
     "axis": (moving("continuous", '<axis xyz="0 1"/>'), "xyz must be three numbers, found '0 1'"),
-    "origin": (moving("fixed", '<origin xyz="0 1 up"/>'), "expected 6 finite numbers, found '0 1 up"),
-    "mass": ((link("a", '<inertial><mass value="5 kg"/></inertial>'),), "expected one finite number, found '5 kg'"),
-    "size": ((link("a", BODY + shape('<box size="1 2"/>')),), "/box/size: expected 3 finite numbers, found '1 2'"),
+    "origin": (
+        moving("fixed", '<origin xyz="0 1 up"/>'),
+        "expected 6 finite numbers, found '0 1 up",
+    ),
+    "mass": (
+        (link("a", '<inertial><mass value="5 kg"/></inertial>'),),
+        "expected one finite number, found '5 kg'",
+    ),
+    "size": (
+        (link("a", BODY + shape('<box size="1 2"/>')),),
+        "/box/size: expected 3 finite numbers, found '1 2'",
+    ),
     "negative": ((link("a", BODY + shape('<sphere radius="-1"/>')),), "sizes must be from 1e-06"),
     "no radius": ((link("a", BODY + shape('<sphere size="1"/>')),), "has no attribute 'radius'"),
-    "shape": ((link("a", BODY + shape('<cone radius="1"/>')),), "<cone> is not a URDF shape; use one of box, cylinder"),
+    "shape": (
+        (link("a", BODY + shape('<cone radius="1"/>')),),
+        "<cone> is not a URDF shape; use one of box, cylinder",
+    ),
     "no shape": ((link("a", BODY + shape("")),), "has no <geometry> with a shape in it"),
     "xacro": (
         (link("a", BODY + shape('<sphere radius="${r}"/>')),),
         r"is xacro, not URDF; run 'xacro FILE > robot.urdf'",
     ),
-    "macro": (('<x:macro xmlns:x="http://www.ros.org/wiki/xacro" name="m"/>', A), ":3: .*is xacro, not URDF"),
+    "macro": (
+        ('<x:macro xmlns:x="http://www.ros.org/wiki/xacro" name="m"/>', A),
+        ":3: .*is xacro, not URDF",
+    ),
     "twice": ((A, A), "name is used twice"),
 }
 

@@ -164,14 +164,21 @@ class _Worker:
 
     @property
     def name(self) -> str:
-        return self.address if self.hello is None else f"{self.address} ({printable(self.hello.host)})"
+        return (
+            self.address if self.hello is None else f"{self.address} ({printable(self.hello.host)})"
+        )
 
 
 class ClusterPool:
     """The workers of the `cluster` of a scenario, and one process here while something is made to compare with."""
 
     def __init__(
-        self, scenario: Scenario, world: World, robot: Model, cluster: str, tell: Callable[[int, str], None]
+        self,
+        scenario: Scenario,
+        world: World,
+        robot: Model,
+        cluster: str,
+        tell: Callable[[int, str], None],
     ) -> None:
         """Calls `tell` with the number of tests that the cluster can run at the same time, and a sentence. Raises UserError if no
         scheduler answers, or where Drake is needed and not installed.
@@ -182,7 +189,9 @@ class ClusterPool:
         self._blob = pickle.dumps(self._parts)
         self._run = f"{__version__} {sha256(self._blob).hexdigest()}"
         self._topic = f"ddenv-{uuid.uuid4().hex}"
-        self._whole = Run(keep=frozenset(world.elements(scenario.protected)), seed=seed_of(scenario.reduction, 0))
+        self._whole = Run(
+            keep=frozenset(world.elements(scenario.protected)), seed=seed_of(scenario.reduction, 0)
+        )
         self._workers: dict[str, _Worker] = {}
         self._waiting: list[Asked] = []
         # Workers that have answered, each with the run that it made to compare.
@@ -199,7 +208,9 @@ class ClusterPool:
         # What has happened in other threads, to be done in that of the engine.
         self._due: SimpleQueue[Callable[[], None]] = SimpleQueue()
         tell(0, f"asking the Dask scheduler of {cluster}")
-        self._link = Link(cluster, self._later(self._attached), self._later(self._there), self._later(self._lost))
+        self._link = Link(
+            cluster, self._later(self._attached), self._later(self._there), self._later(self._lost)
+        )
         if self._home is not None:
             self._home.submit(REFERENCE, self._whole)
 
@@ -250,7 +261,9 @@ class ClusterPool:
         if self._room != self._said:
             workers = sum(worker.accepted for worker in self._workers.values())
             tests = count(self._room, "test")
-            self._news.append(f"{count(workers, 'worker')} of the cluster can run {tests} at the same time")
+            self._news.append(
+                f"{count(workers, 'worker')} of the cluster can run {tests} at the same time"
+            )
         if self._news:
             self._said = self._room
             self._tell(self._room, "; ".join(self._news))
@@ -264,7 +277,9 @@ class ClusterPool:
     def _attached(self, client: Client) -> None:
         self._client = client
         # The progress of running tests; it comes in Dask's own thread.
-        self._client.subscribe_topic(self._topic, lambda event: self._progress.update({event[1]["test"]: event[1]}))
+        self._client.subscribe_topic(
+            self._topic, lambda event: self._progress.update({event[1]["test"]: event[1]})
+        )
         with warnings.catch_warnings():
             # A world with meshes is large, and goes out once.
             warnings.simplefilter("ignore")
@@ -279,7 +294,9 @@ class ClusterPool:
         for address in list(self._workers):
             self._gone(address)
         without = "To continue without it, stop the run and resume it with --cluster here"
-        self._news.append(f"the Dask scheduler of {self._cluster} is lost ({why}); waiting for it. {without}")
+        self._news.append(
+            f"the Dask scheduler of {self._cluster} is lost ({why}); waiting for it. {without}"
+        )
 
     def _there(self, threads: Mapping[str, int]) -> None:
         gone = [address for address in self._workers if address not in threads]
@@ -287,13 +304,21 @@ class ClusterPool:
         if gone:
             again = f"; {count(lost, 'test')} repeated elsewhere" if lost else ""
             self._news.append(f"{count(len(gone), 'worker')} left the cluster{again}")
-        new = [_Worker(address=address, threads=threads[address]) for address in threads if address not in self._workers]
+        new = [
+            _Worker(address=address, threads=threads[address])
+            for address in threads
+            if address not in self._workers
+        ]
         for worker in new:
             self._workers[worker.address] = worker
-            self._hand_out(worker, greet, Asked(self._run, self._topic, REFERENCE, self._whole), None)
+            self._hand_out(
+                worker, greet, Asked(self._run, self._topic, REFERENCE, self._whole), None
+            )
         if new:
             first = ": each first runs the whole world once, to compare the bits with ours"
-            self._news.append(f"{count(len(new), 'worker')} joined the cluster{first if self._home else ''}")
+            self._news.append(
+                f"{count(len(new), 'worker')} joined the cluster{first if self._home else ''}"
+            )
 
     def _gone(self, address: str) -> int:
         """Forgets a worker; returns how many of its tests have to be made again."""
@@ -317,7 +342,9 @@ class ClusterPool:
             asked = self._waiting.pop(0)
             self._hand_out(worker, make, asked, asked)
 
-    def _hand_out(self, worker: _Worker, what: Callable[..., Any], words: Asked, asked: Asked | None) -> None:
+    def _hand_out(
+        self, worker: _Worker, what: Callable[..., Any], words: Asked, asked: Asked | None
+    ) -> None:
         assert self._client is not None
         key = f"{what.__name__}-{uuid.uuid4().hex}"
         try:
@@ -394,7 +421,19 @@ class ClusterPool:
     def live(self) -> list[tuple[Live, float]]:
         """As `Pool.live`."""
         rows = (row for test in self._tests if (row := self._progress.get(test)) is not None)
-        return [(Live(slot=row["test"], test=row["test"], time=row["time"], pose=row["pose"], models=row["models"]), row["real"]) for row in rows]
+        return [
+            (
+                Live(
+                    slot=row["test"],
+                    test=row["test"],
+                    time=row["time"],
+                    pose=row["pose"],
+                    models=row["models"],
+                ),
+                row["real"],
+            )
+            for row in rows
+        ]
 
     def close(self) -> None:
         """Drops what runs: the workers end it by themselves."""
@@ -405,7 +444,14 @@ class ClusterPool:
         self._workers.clear()
         if client is not None and taken:
             with suppress(Exception):
-                client.sync(client._run, forget, self._run, workers=taken, on_error="ignore", callback_timeout=GOODBYE)
+                client.sync(
+                    client._run,
+                    forget,
+                    self._run,
+                    workers=taken,
+                    on_error="ignore",
+                    callback_timeout=GOODBYE,
+                )
         self._link.close()
 
 
@@ -424,7 +470,9 @@ def refusal(hello: Hello, there: Result | None, here: RunResult | None) -> str:
     if there is not None:
         ends = [(run.outcome, run.failure, run.cut, run.took_part) for run in (there, here)]
         rows, ours = ({**run.motions, "": run.trajectory} for run in (there, here))
-        moved = rows.keys() == ours.keys() and all(np.array_equal(rows[name], ours[name]) for name in ours)
+        moved = rows.keys() == ours.keys() and all(
+            np.array_equal(rows[name], ours[name]) for name in ours
+        )
         same = moved and ends[0] == ends[1]
     if not same:
         theirs = f"{hello.simulator}, {hello.machine}"

@@ -83,7 +83,12 @@ def make(parts: bytes, asked: Asked) -> Result:
             if time.monotonic() > due:
                 due = time.monotonic() + PERIOD
                 for live, real in child.live():
-                    row = {"test": live.test, "time": live.time, "pose": list(live.pose), "models": live.models}
+                    row = {
+                        "test": live.test,
+                        "time": live.time,
+                        "pose": list(live.pose),
+                        "models": live.models,
+                    }
                     worker.log_event(asked.topic, row | {"real": real})
     return ended[0][1]
 

@@ -93,10 +93,21 @@ def _parts(collision: Collision, axles: Sequence[Joint], kind: Kind) -> list[Pla
         case Cylinder(radius, length):
             return cylinder(radius, length, kind)
         case Capsule(radius, length):
-            tube = cylinder(radius, length, kind) if kind == "static" else prism(radius, length, rolls=True)
-            return [*tube, *(Placed(Sphere(radius), Pose((0.0, 0.0, end * length / 2))) for end in (-1, 1))]
+            tube = (
+                cylinder(radius, length, kind)
+                if kind == "static"
+                else prism(radius, length, rolls=True)
+            )
+            return [
+                *tube,
+                *(Placed(Sphere(radius), Pose((0.0, 0.0, end * length / 2))) for end in (-1, 1)),
+            ]
         case Mesh():
-            return [placed for shape, pose in pieces(collision.shape) for placed in _piece(shape, pose, kind)]
+            return [
+                placed
+                for shape, pose in pieces(collision.shape)
+                for placed in _piece(shape, pose, kind)
+            ]
     return [Placed(collision.shape, HERE)]
 
 
@@ -104,7 +115,9 @@ def _piece(shape: Shape, pose: Pose, kind: Kind) -> list[Placed]:
     """What stands for a piece of a mesh at `pose` in the frame of the mesh."""
     if not isinstance(shape, Cylinder):
         return [Placed(shape, pose)]
-    return [part._replace(pose=pose @ part.pose) for part in cylinder(shape.radius, shape.length, kind)]
+    return [
+        part._replace(pose=pose @ part.pose) for part in cylinder(shape.radius, shape.length, kind)
+    ]
 
 
 def cylinder(radius: float, length: float, kind: Kind) -> list[Placed]:
@@ -114,12 +127,18 @@ def cylinder(radius: float, length: float, kind: Kind) -> list[Placed]:
     boxes of any length exactly, so it is made of boxes; between the edges of what rolls, spheres as wide as it touch the ground.
     """
     if kind == "static":
-        return [Placed(Cylinder(radius, length), HERE, "spheres"), Placed(_fine_prism(radius, length), HERE, "others")]
+        return [
+            Placed(Cylinder(radius, length), HERE, "spheres"),
+            Placed(_fine_prism(radius, length), HERE, "others"),
+        ]
     if kind == "robot":
         return prism(radius, length, rolls=False)
     width = min(length / 2, radius)
     ends = sorted({width - length / 2, length / 2 - width})
-    return [*prism(radius, length, rolls=True), *(sphere for end in ends for sphere in ring(radius, width, end))]
+    return [
+        *prism(radius, length, rolls=True),
+        *(sphere for end in ends for sphere in ring(radius, width, end)),
+    ]
 
 
 def _fine_prism(radius: float, length: float) -> Mesh:
@@ -144,7 +163,10 @@ def prism(radius: float, length: float, rolls: bool) -> list[Placed]:
     angle = math.pi / (2 * half)
     outer = radius if rolls else _mean_outer(radius, 2 * half)
     box = Box((2 * outer * math.cos(angle), 2 * outer * math.sin(angle), length))
-    return [Placed(box, Pose.from_rpy(0.0, 0.0, 0.0, 0.0, 0.0, 2 * angle * number)) for number in range(half)]
+    return [
+        Placed(box, Pose.from_rpy(0.0, 0.0, 0.0, 0.0, 0.0, 2 * angle * number))
+        for number in range(half)
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,12 +188,20 @@ def tyre(wheel: Wheel) -> list[Placed]:
     shoulder = min(max(half, THINNEST * radius), radius / 2)
     inside = max(0.0, half - shoulder)
     if half <= radius:
-        spheres = [part for place in _spread(inside, shoulder / 2) for part in ring(radius, shoulder, place)]
+        spheres = [
+            part
+            for place in _spread(inside, shoulder / 2)
+            for part in ring(radius, shoulder, place)
+        ]
     else:
         # Between two rings that are its shoulders the whole wheel fits as a ball, which it rolls on.
         within = radius * (1 - BUMP_SHARE)
         spheres = [part for place in (-inside, inside) for part in ring(within, shoulder, place)]
-        spheres += [part for place in _spread(half - radius, radius / 4) for part in ring(radius, radius, place)]
+        spheres += [
+            part
+            for place in _spread(half - radius, radius / 4)
+            for part in ring(radius, radius, place)
+        ]
     return [part._replace(pose=wheel.pose @ part.pose) for part in spheres]
 
 
@@ -195,7 +225,9 @@ def ring(radius: float, width: float, height: float) -> list[Placed]:
     count = min(math.ceil(max(even, closed)), MOST_SPHERES)
     inner *= (math.pi / count) / math.sin(math.pi / count)
     angles = (math.tau * number / count for number in range(count))
-    places: list[Vector] = [(inner * math.cos(angle), inner * math.sin(angle), height) for angle in angles]
+    places: list[Vector] = [
+        (inner * math.cos(angle), inner * math.sin(angle), height) for angle in angles
+    ]
     return [Placed(Sphere(width), Pose(place)) for place in places]
 
 

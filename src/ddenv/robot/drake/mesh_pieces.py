@@ -74,7 +74,12 @@ def _cut(mesh: Mesh) -> list[Mesh]:
     return [Mesh(f"{mesh.origin} {number}", *part) for number, part in enumerate(parts)]
 
 
-def _halves(vertices: Floats, faces: Floats, normal: Floats, place: Floats) -> list[tuple[Floats, Floats]]:
+def _halves(
+    vertices: Floats, faces: Floats, normal: Floats, place: Floats
+) -> list[tuple[Floats, Floats]]:
     """The convex hull of `vertices`, cut by the plane through `place` (3,) m; one part if the plane misses it."""
-    sides = (trimesh.intersections.slice_faces_plane(vertices, faces, side * normal, place)[0] for side in (-1, 1))
+    sides = (
+        trimesh.intersections.slice_faces_plane(vertices, faces, side * normal, place)[0]
+        for side in (-1, 1)
+    )
     return [convex_hull(points) for points in sides if len(points)]

@@ -127,10 +127,15 @@ class Built:
 
     def shapes(self) -> list[tuple[str, tuple[GeometryId, ...]]]:
         """The collision shapes of each model but the robot: first those that never move, then those that can."""
-        return [*self.static.items(), *((name, body.geometry) for name, body in self.moving.items())]
+        return [
+            *self.static.items(),
+            *((name, body.geometry) for name, body in self.moving.items()),
+        ]
 
 
-def build(world: World, robot: Model, drive: Drive, simulation: Simulation, motor_gain: float) -> Built:
+def build(
+    world: World, robot: Model, drive: Drive, simulation: Simulation, motor_gain: float
+) -> Built:
     """The finished plant. `motor_gain` (N m s/rad) turns a wheel's speed error into torque.
 
     Raises ValueError or RuntimeError for what cannot be simulated, such as a moving link without inertia.
@@ -152,7 +157,9 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
     static, touched_by = _add_still(plant, models, wheels)
     driver = _add_moving(plant, scene_graph, robot, "robot", None)
     for joint in (joint for joint in robot.joints if joint.name in drive.joints):
-        actuator = plant.AddJointActuator(joint.name, plant.GetJointByName(joint.name, driver.instance), joint.effort)
+        actuator = plant.AddJointActuator(
+            joint.name, plant.GetJointByName(joint.name, driver.instance), joint.effort
+        )
         actuator.set_controller_gains(PdControllerGains(p=0.0, d=motor_gain))
     moving = {
         model.name: _add_moving(plant, scene_graph, model, f"model/{model.name}", wheels)
@@ -177,12 +184,28 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
         filters.Apply(CollisionFilterDeclaration().ExcludeBetween(one, other))
     # Drake has filtered links that a joint connects.
     filtered = scene_graph.model_inspector().CollisionFiltered
-    shapes = {name: map(plant.GetCollisionGeometriesForBody, body.links) for name, body in moving.items()}
+    shapes = {
+        name: map(plant.GetCollisionGeometriesForBody, body.links) for name, body in moving.items()
+    }
     own_pairs = {
-        name: [pair for pair in combinations(filter(None, found), 2) if not filtered(pair[0][0], pair[1][0])]
+        name: [
+            pair
+            for pair in combinations(filter(None, found), 2)
+            if not filtered(pair[0][0], pair[1][0])
+        ]
         for name, found in shapes.items()
     }
-    return Built(diagram=builder.Build(), plant=plant, scene_graph=scene_graph, robot=driver, static=static, moving=moving, twins=twins, own_pairs=own_pairs, apart=apart)
+    return Built(
+        diagram=builder.Build(),
+        plant=plant,
+        scene_graph=scene_graph,
+        robot=driver,
+        static=static,
+        moving=moving,
+        twins=twins,
+        own_pairs=own_pairs,
+        apart=apart,
+    )
 
 
 def _apart(
@@ -228,7 +251,9 @@ def _place_in_order(model: Model) -> tuple[object, ...]:
 
     So a run does not depend on the order of the models in a file.
     """
-    shapes = [(link.pose, [(one.pose, one.shape) for one in link.collisions]) for link in model.links]
+    shapes = [
+        (link.pose, [(one.pose, one.shape) for one in link.collisions]) for link in model.links
+    ]
     return model.pose.position, model.pose.quaternion, repr(shapes), model.name
 
 
@@ -240,10 +265,16 @@ def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
         for number, link in enumerate(model.links):
             for solid in solids[number]:
                 name = str(plant.num_collision_geometries())
-                away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
-                geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, solid.shape, name, solid.surface)
+                away = RigidTransform(
+                    to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP]))
+                )
+                geometry = plant.RegisterCollisionGeometry(
+                    plant.world_body(), away, solid.shape, name, solid.surface
+                )
                 place = transform(link.pose.inverse() @ solid.pose)
-                parts.append(Part(geometry=geometry, link=number, shape=solid.shape, pose=place, away=away))
+                parts.append(
+                    Part(geometry=geometry, link=number, shape=solid.shape, pose=place, away=away)
+                )
         return Twin(tuple(part.geometry for part in parts), parts=tuple(parts))
     instance = plant.AddModelInstance(f"twin/{model.name}")
     shapes: list[GeometryId] = []
@@ -260,7 +291,11 @@ def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
 
 
 def _add_moving(
-    plant: MultibodyPlant, scene_graph: SceneGraph, model: Model, instance_name: str, wheels: float | None
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    model: Model,
+    instance_name: str,
+    wheels: float | None,
 ) -> Body:
     """Adds a model of the world, or (`wheels` is None) the robot."""
     instance = plant.AddModelInstance(instance_name)
@@ -279,14 +314,23 @@ def _add_moving(
         geometry += _register(plant, body, link.pose.inverse(), solids)
         boxes.append(bounds(link.collisions, link.pose.inverse()))
     if not model.self_collide:
-        scene_graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(geometry)))
+        scene_graph.collision_filter_manager().Apply(
+            CollisionFilterDeclaration().ExcludeWithin(GeometrySet(geometry))
+        )
     by_name = {link.name: (link, body) for link, body in zip(model.links, bodies, strict=True)}
     for joint in model.joints:
         _add_joint(plant, joint, by_name, instance_name)
     if not model.gravity:
         plant.set_gravity_enabled(instance, False)
     poses = tuple(link.pose for link in model.links)
-    return Body(name=model.name, instance=instance, links=tuple(bodies), poses=poses, geometry=tuple(geometry), bounds=tuple(boxes))
+    return Body(
+        name=model.name,
+        instance=instance,
+        links=tuple(bodies),
+        poses=poses,
+        geometry=tuple(geometry),
+        bounds=tuple(boxes),
+    )
 
 
 def _inertia(model: Model, link: Link) -> SpatialInertia:
@@ -299,14 +343,18 @@ def _inertia(model: Model, link: Link) -> SpatialInertia:
     return SpatialInertia.Zero()
 
 
-def _register(plant: MultibodyPlant, body: RigidBody, frame: Pose, solids: Iterable[Solid]) -> list[GeometryId]:
+def _register(
+    plant: MultibodyPlant, body: RigidBody, frame: Pose, solids: Iterable[Solid]
+) -> list[GeometryId]:
     """Registers `solids` on `body`; `frame` is the pose of the world in the body's frame."""
     identities = []
     for solid in solids:
         # Drake requires different names.
         name = str(plant.num_collision_geometries())
         place = transform(frame @ solid.pose)
-        identities.append(plant.RegisterCollisionGeometry(body, place, solid.shape, name, solid.surface))
+        identities.append(
+            plant.RegisterCollisionGeometry(body, place, solid.shape, name, solid.surface)
+        )
     return identities
 
 
@@ -324,7 +372,10 @@ BALL_AXES = np.array([[0.8, 0.0, -0.6], [0.36, 0.8, 0.48], [0.48, -0.6, 0.64]])
 
 
 def _add_joint(
-    plant: MultibodyPlant, joint: Joint, links: dict[str, tuple[Link, RigidBody]], instance_name: str
+    plant: MultibodyPlant,
+    joint: Joint,
+    links: dict[str, tuple[Link, RigidBody]],
+    instance_name: str,
 ) -> None:
     """Adds `joint` between two of `links`, or between one of them and the world. Raises ValueError for an unknown kind."""
     # The axes of both frames, as columns, are the same in the start pose, so that every joint position is 0 there.
@@ -339,9 +390,17 @@ def _add_joint(
     at = RigidTransform(RotationMatrix(to_drake(axes)), to_drake(np.array(joint.pose.position)))
     frames: list[Frame] = []
     for end, name in (("parent", joint.parent), ("child", joint.child)):
-        pose, body = (Pose(), plant.world_body()) if name == "world" else (links[name][0].pose, links[name][1])
+        pose, body = (
+            (Pose(), plant.world_body())
+            if name == "world"
+            else (links[name][0].pose, links[name][1])
+        )
         place = transform(pose).inverse() @ at
-        frames.append(plant.AddFrame(FixedOffsetFrame(f"{instance_name}/{joint.name}/{end}", body.body_frame(), place)))
+        frames.append(
+            plant.AddFrame(
+                FixedOffsetFrame(f"{instance_name}/{joint.name}/{end}", body.body_frame(), place)
+            )
+        )
     parent, child = frames
     plant.AddJoint(_joint(joint, parent, child))
 
@@ -352,9 +411,13 @@ def _joint(joint: Joint, parent: Frame, child: Frame) -> DrakeJoint:
     axis = to_drake(np.array(joint.axis))
     match joint.kind:
         case "revolute" | "continuous":
-            return RevoluteJoint(joint.name, parent, child, axis, joint.lower, joint.upper, joint.damping)
+            return RevoluteJoint(
+                joint.name, parent, child, axis, joint.lower, joint.upper, joint.damping
+            )
         case "prismatic":
-            return PrismaticJoint(joint.name, parent, child, axis, joint.lower, joint.upper, joint.damping)
+            return PrismaticJoint(
+                joint.name, parent, child, axis, joint.lower, joint.upper, joint.damping
+            )
         case "ball":
             return BallRpyJoint(joint.name, parent, child, joint.damping)
         case "universal":

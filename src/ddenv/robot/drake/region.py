@@ -46,7 +46,10 @@ class Region:
     def of(cls, spawn: Point, goal: Point, moving: Iterable[Model]) -> Region:
         """The region around the way from `spawn` to `goal` and around the models `moving`."""
         boxes = (box for model in moving if (box := model_bounds(model)) is not None)
-        places = [(((low + high) / 2)[:2], AROUND + np.linalg.norm((high - low)[:2]) / 2) for low, high in boxes]
+        places = [
+            (((low + high) / 2)[:2], AROUND + np.linalg.norm((high - low)[:2]) / 2)
+            for low, high in boxes
+        ]
         starts = np.array([spawn, *(place for place, _ in places)], dtype=float)
         ends = np.array([goal, *starts[1:]], dtype=float)
         return cls(starts, ends, np.array([WIDTH, *(width for _, width in places)]))

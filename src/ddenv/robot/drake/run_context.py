@@ -49,7 +49,9 @@ class Presence:
         gone = [static[name] for name in removed - self._removed if static.get(name)]
         back = [static[name] for name in self._removed - removed if static.get(name)]
         if gone:
-            self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(_set(gone), self._movers))
+            self._filters.Apply(
+                CollisionFilterDeclaration().ExcludeBetween(_set(gone), self._movers)
+            )
         if back:
             self._filters.Apply(CollisionFilterDeclaration().AllowBetween(_set(back), self._movers))
             self._keep_apart()
@@ -71,7 +73,11 @@ class Presence:
             self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(one, other))
 
     def _apply(
-        self, between: Callable[..., object], bodies: Sequence[Body], others: Sequence[Body], robot: bool
+        self,
+        between: Callable[..., object],
+        bodies: Sequence[Body],
+        others: Sequence[Body],
+        robot: bool,
     ) -> None:
         declaration = CollisionFilterDeclaration()
         bodies = [body for body in bodies if body.name not in self._built.twins]
@@ -82,7 +88,11 @@ class Presence:
             if robot:
                 between(declaration, mine, self._robot)
             # A model does not touch its own links that never move: a door its frame.
-            between(declaration, mine, _set(geometry for name, geometry in self._kept.items() if name != body.name))
+            between(
+                declaration,
+                mine,
+                _set(geometry for name, geometry in self._kept.items() if name != body.name),
+            )
             for one, other in self._built.own_pairs[body.name]:
                 between(declaration, GeometrySet(one), GeometrySet(other))
         self._filters.Apply(declaration)
@@ -201,7 +211,9 @@ class Twins:
         self._source = cast(SourceId, built.plant.get_source_id())
         self._twins = built.twins
         self._filters = self._scene_graph.collision_filter_manager(self._context)
-        self._welded = GeometrySet([shape for twin in built.twins.values() if twin.places for shape in twin.geometry])
+        self._welded = GeometrySet(
+            [shape for twin in built.twins.values() if twin.places for shape in twin.geometry]
+        )
         self._laid: dict[str, Body] = {}
 
     def lay(self, body: Body, places: Floats, turns: Floats) -> None:
@@ -227,12 +239,16 @@ class Twins:
         """Puts a twin where its links are; None: away."""
         for part in twin.parts:
             pose = part.away if links is None else links[part.link] @ part.pose
-            self._scene_graph.ChangeShape(self._context, self._source, part.geometry, part.shape, pose)
+            self._scene_graph.ChangeShape(
+                self._context, self._source, part.geometry, part.shape, pose
+            )
         # Drake adds such a shape anew. Where it then touched one on a body that is welded to the world, Drake would crash.
         moved = GeometrySet([part.geometry for part in twin.parts])
         self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(moved, self._welded))
         for number, (frame, away) in enumerate(twin.places):
-            frame.SetPoseInParentFrame(self._plant_context, away if links is None else links[number])
+            frame.SetPoseInParentFrame(
+                self._plant_context, away if links is None else links[number]
+            )
 
 
 class RunContext:
@@ -242,7 +258,9 @@ class RunContext:
     `region` is not in the plant; None if everything is.
     """
 
-    def __init__(self, built: Built, robot: Pose, clock: Clock, floor: float, region: Region | None = None) -> None:
+    def __init__(
+        self, built: Built, robot: Pose, clock: Clock, floor: float, region: Region | None = None
+    ) -> None:
         """Everything where it starts. `robot` takes the robot's own frame to the world frame."""
         self.built = built
         self.clock = clock
@@ -251,10 +269,15 @@ class RunContext:
         self.diagram_context = built.diagram.CreateDefaultContext()
         self.plant_context = built.plant.GetMyMutableContextFromRoot(self.diagram_context)
         # The plant's default context has all models at the world's origin.
-        for body, origin in [(built.robot, robot), *((body, Pose()) for body in built.moving.values())]:
+        for body, origin in [
+            (built.robot, robot),
+            *((body, Pose()) for body in built.moving.values()),
+        ]:
             for link, pose in zip(body.links, body.poses, strict=True):
                 if link.is_floating_base_body():
-                    built.plant.SetFloatingBaseBodyPoseInWorldFrame(self.plant_context, link, transform(origin @ pose))
+                    built.plant.SetFloatingBaseBodyPoseInWorldFrame(
+                        self.plant_context, link, transform(origin @ pose)
+                    )
         start = cast(Floats, built.plant.GetPositionsAndVelocities(self.plant_context))
         self.presence = Presence(built, self.diagram_context)
         self.hold = Hold(built, self.plant_context, start)

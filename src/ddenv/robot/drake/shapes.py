@@ -18,7 +18,18 @@ from scipy.spatial import ConvexHull, QhullError
 from ddenv.arrays import Floats
 from ddenv.robot.drake.contact_shapes import contact_shapes, turning_joints
 from ddenv.world.drive import Drive, wheel_links
-from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Link, Mesh, Model, Shape, Sphere
+from ddenv.world.model import (
+    Box,
+    Capsule,
+    Collision,
+    Cylinder,
+    Ellipsoid,
+    Link,
+    Mesh,
+    Model,
+    Shape,
+    Sphere,
+)
 from ddenv.world.pose import Pose, Vector
 
 # The contact of two surfaces is as stiff as both in series. Drake would derive it from the masses in the world, and removing a
@@ -48,12 +59,19 @@ def to_drake(array: Floats) -> Any:
 
 def transform(pose: Pose) -> RigidTransform:
     """`pose` as Drake's transform."""
-    return RigidTransform(Quaternion(to_drake(np.array(pose.quaternion))), to_drake(np.array(pose.position)))
+    return RigidTransform(
+        Quaternion(to_drake(np.array(pose.quaternion))), to_drake(np.array(pose.position))
+    )
 
 
 def wheel_friction(robot: Model, drive: Drive) -> float:
     """The friction coefficient of the robot's driven wheels; the largest if they differ."""
-    links = [link for joint in robot.joints if joint.name in drive.joints for link in wheel_links(robot, joint)]
+    links = [
+        link
+        for joint in robot.joints
+        if joint.name in drive.joints
+        for link in wheel_links(robot, joint)
+    ]
     return max((one.mu for link in links for one in link.collisions), default=0.0)
 
 
@@ -67,7 +85,9 @@ def world_friction(mu: float, wheels: float) -> float:
     return 1.0 / (2.0 / grip - 1.0 / wheels) if grip > 0.0 else 0.0
 
 
-def surface(mu: float, stiffness: float, dissipation: float = DISSIPATION) -> drake.ProximityProperties:
+def surface(
+    mu: float, stiffness: float, dissipation: float = DISSIPATION
+) -> drake.ProximityProperties:
     """A surface with Drake's friction coefficient `mu`, its `stiffness` (N/m) and `dissipation` (s/m).
 
     Static and dynamic friction are equal: with a difference, wheels stick and slip at the rate of the time steps.
@@ -100,7 +120,9 @@ def link_solids(model: Model, link: Link, wheels: float | None, corners: bool) -
     for collision, parts, places in zip(link.collisions, parts_of, rests, strict=True):
         mu = collision.mu if wheels is None else world_friction(collision.mu, wheels)
         properties = surface(mu, stiffness(model), dissipation)
-        solids += [Solid(drake_shape(one.shape), one.pose, properties, one.touches) for one in parts]
+        solids += [
+            Solid(drake_shape(one.shape), one.pose, properties, one.touches) for one in parts
+        ]
         corner = drake.Sphere(CORNER_RADIUS)
         solids += [Solid(corner, collision.pose @ Pose(place), properties) for place in places]
     return solids
@@ -122,7 +144,9 @@ def resting_corners(collisions: Sequence[Collision]) -> list[list[Vector]]:
     if sum(map(len, corners)) <= MOST_CORNERS:
         return corners
     pairs = zip(collisions, corners, strict=True)
-    places = np.array([(each.pose @ Pose(corner)).position for each, found in pairs for corner in found])
+    places = np.array(
+        [(each.pose @ Pose(corner)).position for each, found in pairs for corner in found]
+    )
     try:
         outermost = set(ConvexHull(places).vertices.tolist())
     except QhullError:
@@ -146,7 +170,9 @@ def drake_shape(shape: Shape) -> drake.Shape:
         case Ellipsoid(radii):
             return drake.Ellipsoid(*radii)
         case Mesh(origin, vertices):
-            return drake.Convex(points=to_drake(np.asfortranarray(vertices.T, dtype=float)), label=origin)
+            return drake.Convex(
+                points=to_drake(np.asfortranarray(vertices.T, dtype=float)), label=origin
+            )
     raise ValueError(f"{type(shape).__name__} cannot be simulated")
 
 
@@ -160,7 +186,11 @@ def corners_of(shape: Shape) -> list[Vector]:
             inner = max(radius - CORNER_RADIUS, 0.0)
             height = max(length / 2 - CORNER_RADIUS, 0.0)
             angles = [math.tau * number / RIM_CORNERS for number in range(RIM_CORNERS)]
-            return [(inner * math.cos(a), inner * math.sin(a), end * height) for end in (-1, 1) for a in angles]
+            return [
+                (inner * math.cos(a), inner * math.sin(a), end * height)
+                for end in (-1, 1)
+                for a in angles
+            ]
         case Mesh():
             return _mesh_corners(shape)
     return []

@@ -38,7 +38,10 @@ def with_boxes(model: Model, region: Region | None, way: Region) -> Model:
     How coarse they are follows from the robot's `way` alone.
     """
     links = [
-        replace(link, collisions=tuple(part for one in link.collisions for part in _parts(one, region, way)))
+        replace(
+            link,
+            collisions=tuple(part for one in link.collisions for part in _parts(one, region, way)),
+        )
         for link in model.links
     ]
     return replace(model, links=tuple(links))
@@ -51,10 +54,15 @@ def _parts(collision: Collision, region: Region | None, way: Region) -> list[Col
     for tolerance in TOLERANCES:
         if len(list(islice(boxes(terrain, collision.pose, way, tolerance), MOST + 1))) <= MOST:
             break
-    return [replace(collision, shape=box, pose=pose) for box, pose in boxes(terrain, collision.pose, region, tolerance)]
+    return [
+        replace(collision, shape=box, pose=pose)
+        for box, pose in boxes(terrain, collision.pose, region, tolerance)
+    ]
 
 
-def boxes(terrain: Terrain, place: Pose, region: Region | None, tolerance: float) -> Iterator[tuple[Box, Pose]]:
+def boxes(
+    terrain: Terrain, place: Pose, region: Region | None, tolerance: float
+) -> Iterator[tuple[Box, Pose]]:
     """The boxes, no farther than `tolerance` (m) from the surface of terrain at `place`, that reach into `region`."""
     cells = np.array(terrain.heights.shape[::-1]) - 1.0
     step = np.array(terrain.size) / cells
@@ -65,7 +73,9 @@ def boxes(terrain: Terrain, place: Pose, region: Region | None, tolerance: float
         middle = (low + high - cells) / 2 * step
         half = (high - low) / 2 * step
         centre = place @ Pose((float(middle[0]), float(middle[1]), 0.0))
-        if region is not None and not region.reaches(centre.position[:2], float(np.linalg.norm(half))):
+        if region is not None and not region.reaches(
+            centre.position[:2], float(np.linalg.norm(half))
+        ):
             continue
         finest = (high - low).max() <= FINEST
         found = _box(terrain, low, high, middle, half, np.inf if finest else tolerance)
@@ -91,9 +101,14 @@ def _box(
 
     The part has its `middle` (2,) m in the frame of the terrain, and `half` the size (2,) m.
     """
-    columns, rows = (np.linspace(*ends, max(2, round(ends[1] - ends[0]) + 1)) for ends in zip(low, high, strict=True))
+    columns, rows = (
+        np.linspace(*ends, max(2, round(ends[1] - ends[0]) + 1))
+        for ends in zip(low, high, strict=True)
+    )
     heights = bilinear(terrain.heights, rows[:, None], columns)
-    x, y = (np.linspace(-end, end, count) for end, count in zip(half, heights.shape[::-1], strict=True))
+    x, y = (
+        np.linspace(-end, end, count) for end, count in zip(half, heights.shape[::-1], strict=True)
+    )
     slope_x = (heights.mean(axis=0) * x).sum() / (x * x).sum()
     slope_y = (heights.mean(axis=1) * y).sum() / (y * y).sum()
     rest = heights - slope_x * x - slope_y * y[:, None]
@@ -109,4 +124,6 @@ def _box(
     rim = (CORNERS * reach) @ axes[:, :2].T + top
     if (rim[:, 2] - height_at(terrain, rim[:, 0], rim[:, 1]) > tolerance).any():
         return None
-    return Box(vector([*(2 * reach), THICKNESS])), Pose(vector(top - THICKNESS / 2 * normal), turn.quaternion)
+    return Box(vector([*(2 * reach), THICKNESS])), Pose(
+        vector(top - THICKNESS / 2 * normal), turn.quaternion
+    )

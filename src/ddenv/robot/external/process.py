@@ -61,13 +61,21 @@ class Complaints:
         """At most so many lines that are not empty, each shortened."""
         lines = [line.strip() for line in self._end.decode(errors="replace").splitlines()]
         last = [line for line in lines if line][-most:]
-        return [printable(line if len(line) <= SHOWN else f"{line[: SHOWN - 3]}...") for line in last]
+        return [
+            printable(line if len(line) <= SHOWN else f"{line[: SHOWN - 3]}...") for line in last
+        ]
 
     def is_exception(self) -> bool:
         """Whether it ends with a traceback. That of an interrupted program does not count: it only says that it was stopped."""
         _, found, after = self._end.rpartition(TRACEBACK)
-        not_indented = [line for line in after.splitlines() if line.strip() and not line.startswith(b" ")]
-        return bool(found) and len(not_indented) <= 1 and not any(line.startswith(STOPPED) for line in not_indented)
+        not_indented = [
+            line for line in after.splitlines() if line.strip() and not line.startswith(b" ")
+        ]
+        return (
+            bool(found)
+            and len(not_indented) <= 1
+            and not any(line.startswith(STOPPED) for line in not_indented)
+        )
 
 
 @dataclass(frozen=True)
@@ -85,7 +93,9 @@ class Running:
 
 
 @contextlib.contextmanager
-def running(words: Sequence[str], folder: Path, environment: Mapping[str, str], temporary: Path) -> Iterator[Running]:
+def running(
+    words: Sequence[str], folder: Path, environment: Mapping[str, str], temporary: Path
+) -> Iterator[Running]:
     """The command `words`, which starts in `folder` at `BEGIN`.
 
     At the end, nothing that the command started is left, and the folder `temporary` is removed, even if this process is killed
@@ -121,7 +131,9 @@ def running(words: Sequence[str], folder: Path, environment: Mapping[str, str], 
                     supervisor.wait()
 
 
-def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_much: Callable[[], str]) -> Ended:
+def watch(
+    command: Running, seconds: float, take: Callable[[bytes], None], too_much: Callable[[], str]
+) -> Ended:
     """Waits for the command's end, for a maximum of `seconds` of wall clock, and reads all its output.
 
     `take` gets what the command writes to stdout. As soon as `too_much()` returns a reason, the command is ended early.
@@ -162,7 +174,12 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
             for _ in range(MOST_LEFT // PIECE):
                 taker(os.read(stream.fileno(), PIECE))
     code, reason = _read(said)
-    return Ended(None if why else code, why or reason, "".join(complaints.last_lines(1)), complaints.is_exception())
+    return Ended(
+        None if why else code,
+        why or reason,
+        "".join(complaints.last_lines(1)),
+        complaints.is_exception(),
+    )
 
 
 def _read(said: str) -> tuple[int | None, str]:

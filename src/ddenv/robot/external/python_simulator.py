@@ -20,7 +20,14 @@ from ddenv.robot.controllers import SEEDS, Answer, guarded, load
 from ddenv.robot.deadline import call_within
 from ddenv.robot.external.process import running
 from ddenv.robot.external.protocol import Ended, Row, SimulatorSetup, SubWorld
-from ddenv.robot.external.simulator import EXPECTED, BadLog, PoseLog, scenario_in, temporary_folder, write_files
+from ddenv.robot.external.simulator import (
+    EXPECTED,
+    BadLog,
+    PoseLog,
+    scenario_in,
+    temporary_folder,
+    write_files,
+)
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.result import Ends, PoseRow, Progress, RunResult, has_moved
 from ddenv.schemas import nearest
@@ -68,7 +75,9 @@ class PythonSimulator:
                 folder=self._folder,
                 model_path=(scenario.world.parent, *scenario.reading.model_path),
             )
-            self._simulator = self._guarded("__init__", lambda: call_within(LONGEST_START, make, setup))
+            self._simulator = self._guarded(
+                "__init__", lambda: call_within(LONGEST_START, make, setup)
+            )
             self._open = opened.pop_all()
 
     def close(self) -> None:
@@ -76,7 +85,11 @@ class PythonSimulator:
         self._open.close()
 
     def run(
-        self, keep: frozenset[str], seed: int, progress: Progress | None = None, ends: Ends | None = None
+        self,
+        keep: frozenset[str],
+        seed: int,
+        progress: Progress | None = None,
+        ends: Ends | None = None,
     ) -> RunResult:
         """As `Simulator.run`; `ends` has no effect. Raises UserError for whatever the user's class does wrong."""
         if unknown := keep - self._names:
@@ -88,7 +101,12 @@ class PythonSimulator:
         write_files(self._path.parent, {self._path: without(self._world, removed)})
         models = tuple(model.name for model in self._world.models if model.name not in removed)
         world = SubWorld(self._path, self._its_scenario, models)
-        links = [link for model in self._world.models if model.name in models for link in jointed_links(model)]
+        links = [
+            link
+            for model in self._world.models
+            if model.name in models
+            for link in jointed_links(model)
+        ]
         poses = Poses(models, progress, links)
         if progress is not None:
             # The time of a test begins here, whatever came before it.
@@ -109,7 +127,9 @@ class PythonSimulator:
             took_part=took_part,
         )
 
-    def _ended(self, world: SubWorld, seed: int, poses: Poses) -> tuple[Ended, frozenset[str] | None]:
+    def _ended(
+        self, world: SubWorld, seed: int, poses: Poses
+    ) -> tuple[Ended, frozenset[str] | None]:
         """Makes a test, and adds what it yields and returns to `poses`. Raises BadLog for nonsense."""
         answer = self._simulator.run(world, seed, self._scenario.failure.timeout)
         if isinstance(answer, Generator):
@@ -120,7 +140,9 @@ class PythonSimulator:
             except StopIteration as stop:
                 answer = stop.value
         if not isinstance(answer, Ended) or not isinstance(answer.reached, bool | np.bool_):
-            raise BadLog(f"returned {_shown(answer)}; expected ddenv.Ended(reached), with True or False")
+            raise BadLog(
+                f"returned {_shown(answer)}; expected ddenv.Ended(reached), with True or False"
+            )
         for row in answer.poses:
             poses.add(row)
         if not len(poses.robot.rows()):
@@ -132,7 +154,9 @@ class PythonSimulator:
 
     def _guarded(self, what: str, call: Callable[[], Answer]) -> Answer:
         """Returns `call()`. Raises UserError, in one line, for whatever that raises."""
-        return guarded(f"simulator {self._name}: {what}", call, self._folder, f"{LONGEST_START:g} s")
+        return guarded(
+            f"simulator {self._name}: {what}", call, self._folder, f"{LONGEST_START:g} s"
+        )
 
 
 class Poses:
@@ -141,7 +165,9 @@ class Poses:
     `progress` gets them.
     """
 
-    def __init__(self, models: Iterable[str], progress: Progress | None, links: Iterable[str] = ()) -> None:
+    def __init__(
+        self, models: Iterable[str], progress: Progress | None, links: Iterable[str] = ()
+    ) -> None:
         self.robot = PoseLog()
         self._models = tuple(models)
         self._links = frozenset(links)
@@ -154,7 +180,9 @@ class Poses:
         """Adds a row. Raises BadLog."""
         self._count += 1
         where = f"gave row {self._count}"
-        is_row = isinstance(row, tuple | list) and (len(row) == 2 or (len(row) == 3 and isinstance(row[2], Mapping)))
+        is_row = isinstance(row, tuple | list) and (
+            len(row) == 2 or (len(row) == 3 and isinstance(row[2], Mapping))
+        )
         if not is_row:
             raise BadLog(f"{where}: expected {ROW}, found {_shown(row)}")
         t = row[0]
@@ -164,7 +192,9 @@ class Poses:
         for name, its_pose in others.items():
             if name not in self._links:
                 self.check(name, where)
-            its_row = self._logs.setdefault(name, PoseLog()).take(_numbers(t, its_pose, where), where)
+            its_row = self._logs.setdefault(name, PoseLog()).take(
+                _numbers(t, its_pose, where), where
+            )
             if its_row is not None:
                 self._now[name] = its_row[1:]
         if kept is not None and self._progress is not None:
@@ -174,7 +204,9 @@ class Poses:
         """Raises BadLog if this is not the name of a model of the test's world."""
         if name not in self._models:
             shown = str(name)[:SHOWN]
-            raise BadLog(f"{where}: there is no model '{shown}' in this test's world{nearest(shown, self._models)}")
+            raise BadLog(
+                f"{where}: there is no model '{shown}' in this test's world{nearest(shown, self._models)}"
+            )
 
     def motions(self) -> dict[str, np.ndarray]:
         """The rows (N, 8) of each model that moved, as in `RunResult`."""

@@ -35,7 +35,10 @@ from ddenv.world.scenario import Scenario, Whole
 from ddenv.world.whole import whole_of
 from ddenv.world.write import without
 
-OUTCOMES = {0: "pass", 1: "failed"}  # the meaning of the command's exit codes; all others are errors
+OUTCOMES = {
+    0: "pass",
+    1: "failed",
+}  # the meaning of the command's exit codes; all others are errors
 
 
 class ExternalSimulator:
@@ -53,7 +56,11 @@ class ExternalSimulator:
         self._removable = frozenset(world.elements(scenario.protected))
 
     def run(
-        self, keep: frozenset[str], seed: int, progress: Progress | None = None, ends: Ends | None = None
+        self,
+        keep: frozenset[str],
+        seed: int,
+        progress: Progress | None = None,
+        ends: Ends | None = None,
     ) -> RunResult:
         """As `Simulator.run`, with the robot's pose alone for `progress`, of each row that the command prints.
 
@@ -84,10 +91,19 @@ class ExternalSimulator:
         folder `folder`. Raises UserError if no file can be written.
         """
         world = folder / self._scenario.world.name
-        file = world.with_name(f"{world.name}.poses.csv") if has_placeholder(self._words, "log") else None
+        file = (
+            world.with_name(f"{world.name}.poses.csv")
+            if has_placeholder(self._words, "log")
+            else None
+        )
         log = PoseLog(progress if file is None else None)
         whole = world.with_name(f"{world.name}.scenario.yaml")
-        values = {"world": str(world), "scenario": str(whole), "seed": str(seed), "log": str(file or "/dev/stdout")}
+        values = {
+            "world": str(world),
+            "scenario": str(whole),
+            "seed": str(seed),
+            "log": str(file or "/dev/stdout"),
+        }
         words = filled(self._words, values)
         environment = self._environment(values)
 
@@ -101,16 +117,22 @@ class ExternalSimulator:
         try:
             with running(words, start_folder(self._scenario), environment, folder) as command:
                 scenario = scenario_in(self._scenario, self._whole, world)
-                write_files(folder, {world: without(self._world, self._removable - keep), whole: scenario})
+                write_files(
+                    folder, {world: without(self._world, self._removable - keep), whole: scenario}
+                )
                 command.say(BEGIN)
-                ended = watch(command, self.limit, log.add if file is None else lambda _: None, too_much)
+                ended = watch(
+                    command, self.limit, log.add if file is None else lambda _: None, too_much
+                )
                 # Reading a log that is too large would take longer than writing it did.
                 if file is not None and ended.reason != TOO_LARGE and file.is_file():
                     with contextlib.suppress(OSError), file.open("rb") as content:
                         while log.size <= MOST_BYTES and (piece := content.read(1_000_000)):
                             log.add(piece)
         except OSError as error:
-            ended = Ended(None, f"the command cannot be started: {error.strerror}: {error.filename}", "")
+            ended = Ended(
+                None, f"the command cannot be started: {error.strerror}: {error.filename}", ""
+            )
         return ended, log
 
     def _environment(self, values: dict[str, str]) -> dict[str, str]:
@@ -132,7 +154,10 @@ class ExternalSimulator:
     def _judged(self, ended: Ended, log: PoseLog) -> tuple[str, str, Floats]:
         said = f": {ended.complaint}" if ended.complaint else ""
         if ended.code is None or ended.code not in OUTCOMES:
-            why = ended.reason or f"the command's exit code is {ended.code}, neither 0 nor 1{_of_a_shell(ended.code)}"
+            why = (
+                ended.reason
+                or f"the command's exit code is {ended.code}, neither 0 nor 1{_of_a_shell(ended.code)}"
+            )
             return "error", why + said, self._rows(log)
         if ended.code == 1 and ended.raised:
             return "error", f"the command ended with an exception{said}", self._rows(log)
@@ -144,7 +169,11 @@ class ExternalSimulator:
                 raise BadLog(
                     f"the pose log ends at {rows[-1, 0]:g} s, and the timeout is {timeout:g} s: times are in s"
                 )
-            return outcome, kind_of(rows, fell=False, arrived=None) if outcome == "failed" else "", rows
+            return (
+                outcome,
+                kind_of(rows, fell=False, arrived=None) if outcome == "failed" else "",
+                rows,
+            )
         except BadLog as error:
             return "error", f"{error}{said}", self._rows(log)
 
@@ -315,7 +344,9 @@ class PoseLog:
             raise BadLog(f"{where}: time goes back from {before:g} to {t:g} s")
         length = math.hypot(*turn)
         if length < SHORTEST_QUATERNION:
-            raise BadLog(f"{where}: the quaternion {','.join(f'{part:g}' for part in turn)} has no length")
+            raise BadLog(
+                f"{where}: the quaternion {','.join(f'{part:g}' for part in turn)} has no length"
+            )
         qx, qy, qz, qw = (part / length for part in turn)
         self._last = row = (t, x, y, z, qw, qx, qy, qz)
         # Times that are sums of steps deviate a little.

@@ -74,7 +74,9 @@ class Costmap:
         dx, dy = (self.points - (estimate.x, estimate.y)).T
         bearings = np.arctan2(dy, dx) - estimate.heading
         bearings -= math.tau * np.round(bearings / math.tau)
-        first, last = (self._angles[0], self._angles[-1]) if self._angles is not None else (0.0, 0.0)
+        first, last = (
+            (self._angles[0], self._angles[-1]) if self._angles is not None else (0.0, 0.0)
+        )
         seen = (bearings >= first) & (bearings <= last)
         near = np.hypot(dx, dy) <= np.where(seen, beyond, beyond_unseen)
         self._hit[self._slots[~near]] = False
@@ -83,7 +85,9 @@ class Costmap:
     def _limits(self, scan: Scan, estimate: Estimate) -> Floats:
         """The range (N,) m of each beam beyond which it marks nothing, and has passed all that is known in its direction."""
         count = len(scan.angles)
-        limits = np.full(count, (self.count / 2 + PASSED) * self.resolution + math.hypot(*scan.origin[:2]))
+        limits = np.full(
+            count, (self.count / 2 + PASSED) * self.resolution + math.hypot(*scan.origin[:2])
+        )
         if count > 2 and self.spots.size:
             cosine = math.cos(estimate.heading)
             sine = math.sin(estimate.heading)
@@ -154,7 +158,9 @@ class Costmap:
             np.minimum(ranges[1:-1], ranges[2:], out=far[1:-1])
             np.minimum(far[1:-1], ranges[:-2], out=far[1:-1])
             nearest = self._beams_at(scan, x, y)
-            gone |= np.sqrt(x * x + y * y) + PASSED * self.resolution < far.take(nearest, mode="clip")
+            gone |= np.sqrt(x * x + y * y) + PASSED * self.resolution < far.take(
+                nearest, mode="clip"
+            )
         if gone.any():
             self._hit[slots[gone]] = False
             kept: Booleans = ~gone

@@ -11,7 +11,9 @@ from ddenv.arrays import Booleans, Floats
 from ddenv.robot.protocol import Estimate, Setup
 
 TOUCHED = 0.6  # points nearer to the robot than this part of its padding count as touched
-LEFT = np.array([-1.0, 1.0])  # turns a direction, with its components swapped, by 90 degrees to the left
+LEFT = np.array(
+    [-1.0, 1.0]
+)  # turns a direction, with its components swapped, by 90 degrees to the left
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +65,13 @@ def seen_from(estimate: Estimate) -> Floats:
     y = estimate.y
     cosine = math.cos(estimate.heading)
     sine = math.sin(estimate.heading)
-    return np.array([[cosine, sine, -cosine * x - sine * y], [-sine, cosine, sine * x - cosine * y], [0.0, 0.0, 1.0]])
+    return np.array(
+        [
+            [cosine, sine, -cosine * x - sine * y],
+            [-sine, cosine, sine * x - cosine * y],
+            [0.0, 0.0, 1.0],
+        ]
+    )
 
 
 def legs_beside(

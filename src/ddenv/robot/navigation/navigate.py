@@ -119,7 +119,10 @@ class Progress:
 
     def is_stalled(self, time: float, estimate: Estimate) -> bool:
         """Whether the robot at `estimate` has made no progress for too long at `time` (s)."""
-        if self._from is None or math.hypot(estimate.x - self._from.x, estimate.y - self._from.y) >= MOVED:
+        if (
+            self._from is None
+            or math.hypot(estimate.x - self._from.x, estimate.y - self._from.y) >= MOVED
+        ):
             self._from = estimate
             self._moved = time
             self._heading = estimate.heading
@@ -127,7 +130,10 @@ class Progress:
         elif abs(wrap(estimate.heading - self._heading)) >= TURNED:
             self._heading = estimate.heading
             self._turned = time
-        return time - self._turned >= self._patience or time - self._moved >= ON_THE_SPOT * self._patience
+        return (
+            time - self._turned >= self._patience
+            or time - self._moved >= ON_THE_SPOT * self._patience
+        )
 
 
 # The minimum time between two scans that the map takes in, s; and while the robot waits in place.
@@ -138,14 +144,18 @@ THINK_EVERY = 0.5
 THINK = 1.0
 # If the robot cannot follow its plan, it makes no new one within this distance (m) of where it made the last.
 ELSEWHERE = 0.1
-TOO_SHORT = 2.0  # a plan that ends at the map's border is renewed when less than this (m) is left of it
+TOO_SHORT = (
+    2.0  # a plan that ends at the map's border is renewed when less than this (m) is left of it
+)
 BESIDE = 0.5  # a robot this far (m) off its plan makes a new one
 # The robot keeps its plan if a new one is less than this many times shorter and has no more than this additional room (m), unless
 # the robot is this far (m) off its plan.
 LONGER = 1.1
 CLOSER = 0.03
 SWAY = 0.2
-BETTER = 0.5  # this far (m) from its last recovery the robot starts to count its recovery attempts anew
+BETTER = (
+    0.5  # this far (m) from its last recovery the robot starts to count its recovery attempts anew
+)
 TICK = 1e-6  # clocks that add up periods deviate by less than this, s
 
 
@@ -204,9 +214,13 @@ class Navigator:
         self._map.see(reading.scan, reading.estimate, self._imu)
         spots = self._map.spots
         reach = self._follower.reach
-        near = (np.abs(spots[0] - reading.estimate.x) < reach) & (np.abs(spots[1] - reading.estimate.y) < reach)
+        near = (np.abs(spots[0] - reading.estimate.x) < reach) & (
+            np.abs(spots[1] - reading.estimate.y) < reach
+        )
         self._near = spots[:, near]
-        self._blocked = self._path is not None and self._planner.room(self._path, self._map.points) is None
+        self._blocked = (
+            self._path is not None and self._planner.room(self._path, self._map.points) is None
+        )
 
     def _is_there(self, estimate: Estimate) -> bool:
         goal = self._setup.goal
@@ -216,7 +230,12 @@ class Navigator:
             return True
         # Where the goal itself is not free, the end of the plan has to do.
         path = self._path
-        return path is not None and path.final and path.left <= ARRIVED * tolerance and left <= tolerance
+        return (
+            path is not None
+            and path.final
+            and path.left <= ARRIVED * tolerance
+            and left <= tolerance
+        )
 
     def _follow(self, reading: Reading) -> Twist:
         time = reading.time
@@ -276,7 +295,11 @@ class Navigator:
             return False
         room = self._planner.room(path, points)
         others = self._planner.room(other, points)
-        return room is not None and room >= (others or 0.0) - CLOSER and path.left <= LONGER * other.left
+        return (
+            room is not None
+            and room >= (others or 0.0) - CLOSER
+            and path.left <= LONGER * other.left
+        )
 
     def _try_to_recover(self, reading: Reading) -> Twist:
         self._recovers = self._recovery.begin(reading.time, reading.estimate)

@@ -20,7 +20,9 @@ NEAREST = 0.4
 # It turns on the spot when the path leads farther aside than the first angle, until it is within the second, rad.
 ASIDE = 0.9
 ALONG = 0.25
-ALIGNED = 0.04  # when it is aligned with its path within this angle (rad) and still not free, it stops
+ALIGNED = (
+    0.04  # when it is aligned with its path within this angle (rad) and still not free, it stops
+)
 # Slower turns than this (rad/s) are lost between the wheels and the ground.
 LEAST_TURN = 0.2
 BACK_SPEED = 0.25  # m/s
@@ -35,7 +37,9 @@ PLACES = np.linspace(0.0, 1.0, 7)  # the parts of an arc at which the footprint 
 BENT = 1e-6  # the minimum curvature of an arc, rad: too little to matter
 # Small turns on the spot, and a little way back, as poses for `room`.
 TURN_LEFT, TURN_RIGHT = (
-    np.stack([seen_from(Estimate(0.0, 0.0, side * angle))[:2] for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
+    np.stack(
+        [seen_from(Estimate(0.0, 0.0, side * angle))[:2] for angle in (0.0, 0.1, 0.2, 0.35)], axis=1
+    )
     for side in (1.0, -1.0)
 )
 BACK_UP = np.stack([seen_from(Estimate(-way, 0.0, 0.0))[:2] for way in (0.0, 0.1, 0.2)], axis=1)

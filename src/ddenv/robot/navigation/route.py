@@ -34,7 +34,9 @@ class Path:
     has before its start and after its end. `off` (m) is the robot's distance from the path.
     """
 
-    def __init__(self, corners: list[Point], final: bool = True, back: float = 0.0, on: float = 0.0) -> None:
+    def __init__(
+        self, corners: list[Point], final: bool = True, back: float = 0.0, on: float = 0.0
+    ) -> None:
         self.corners = corners
         self.final = final
         self.back = back
@@ -104,16 +106,23 @@ class Grid:
         self.count = count
         cells = np.arange(count * count)
         x, y = np.divmod(cells, count)
-        inside = [(x + dx >= 0) & (x + dx < count) & (y + dy >= 0) & (y + dy < count) for dx, dy in STEPS]
+        inside = [
+            (x + dx >= 0) & (x + dx < count) & (y + dy >= 0) & (y + dy < count) for dx, dy in STEPS
+        ]
         # A step out of the grid leads back to its own cell.
-        ends = [np.where(there, cells + dx * count + dy, cells) for there, (dx, dy) in zip(inside, STEPS, strict=True)]
+        ends = [
+            np.where(there, cells + dx * count + dy, cells)
+            for there, (dx, dy) in zip(inside, STEPS, strict=True)
+        ]
         to = np.stack(ends, axis=1).astype(np.int32)
         # The indices of the factors (4, cells), flattened, at a step's two ends.
         self._here = (AXES * len(cells) + cells[:, None]).ravel()
         self._there = (AXES * len(cells) + to).ravel()
         self._lengths = np.tile([np.hypot(dx, dy) / 2 for dx, dy in STEPS], len(cells))
         starts = np.arange(0, to.size + 1, len(STEPS), dtype=np.int32)
-        self._graph = csr_matrix((np.ones(to.size), to.ravel(), starts), shape=(len(cells), len(cells)))
+        self._graph = csr_matrix(
+            (np.ones(to.size), to.ravel(), starts), shape=(len(cells), len(cells))
+        )
 
     def search(self, factors: Floats, start: int) -> tuple[Floats, Integers]:
         """Searches the cheapest paths from `start` to all cells.
@@ -124,7 +133,9 @@ class Grid:
         """
         flat = factors.ravel()
         self._graph.data = (flat[self._here] + flat[self._there]) * self._lengths
-        lengths, sources = dijkstra(self._graph, indices=start, return_predecessors=True, limit=LONGEST)
+        lengths, sources = dijkstra(
+            self._graph, indices=start, return_predecessors=True, limit=LONGEST
+        )
         return lengths, sources
 
 
@@ -146,12 +157,16 @@ TIGHT = 1.5
 HEAVY = 50.0  # the factor for blocked cells where the robot already is: it has to get out of there
 APART = 3  # a path can be cut short at corners that are at most this many cells apart
 NEARER = 0.015  # a shortcut may come nearer to an obstacle by this, m
-STRAIGHT = 1.03  # a path at most this many times longer than the straight line is not searched again
+STRAIGHT = (
+    1.03  # a path at most this many times longer than the straight line is not searched again
+)
 # Before and after a narrow place the path goes straight on for the first of these distances (m) that is free.
 STRAIGHT_ON = np.array([0.8, 0.5, 0.25])
 # The sharpest turn there, as the cosine of its angle.
 SHARPEST = -0.3
-DIRECTIONS = tuple((math.cos(axis * math.pi / 4), math.sin(axis * math.pi / 4)) for axis in AXES[:4])
+DIRECTIONS = tuple(
+    (math.cos(axis * math.pi / 4), math.sin(axis * math.pi / 4)) for axis in AXES[:4]
+)
 
 
 class Planner:
@@ -169,10 +184,14 @@ class Planner:
         self._grid = Grid(max(round(planner.size / self._step), 3))
         x, y = np.divmod(np.arange(self._grid.count**2), self._grid.count)
         self._cells = np.stack([x, y], axis=1) * self._step
-        self._border = np.flatnonzero((np.minimum(x, y) == 0) | (np.maximum(x, y) == self._grid.count - 1))
+        self._border = np.flatnonzero(
+            (np.minimum(x, y) == 0) | (np.maximum(x, y) == self._grid.count - 1)
+        )
         middle = self._grid.count // 2
         self._start = middle * (self._grid.count + 1)
-        self._close = np.flatnonzero(np.hypot(x - middle, y - middle) * self._step <= self._body.inscribed * 1.5)
+        self._close = np.flatnonzero(
+            np.hypot(x - middle, y - middle) * self._step <= self._body.inscribed * 1.5
+        )
 
     def plan(self, points: Floats, x: float, y: float) -> Path | None:
         """A path from (x, y) to the goal, or to the best place at the map's border if the goal lies beyond; None if there is none.
@@ -228,7 +247,9 @@ class Planner:
         room = self.room(path, points)
         if room is None or room < self._inflation:
             return False
-        return path.left + math.dist(path.end, self._goal) <= STRAIGHT * math.dist(path.ahead(0.0), self._goal)
+        return path.left + math.dist(path.end, self._goal) <= STRAIGHT * math.dist(
+            path.ahead(0.0), self._goal
+        )
 
     def _target(self, lengths: Floats, corner: Floats, goal_is_free: bool) -> int | None:
         """The cell to go to, None if none can be reached."""
@@ -259,10 +280,14 @@ class Planner:
         numbers = (cells[:, 0, :, None] * count + cells[:, 1, None, :])[near]
         nearest = np.full(count * count, self._inflation)
         np.minimum.at(nearest, numbers, np.hypot(dx, dy))
-        costs = np.where(nearest < self._inflation, np.exp(FALL * (self._body.inscribed - nearest)), 0.0)
+        costs = np.where(
+            nearest < self._inflation, np.exp(FALL * (self._body.inscribed - nearest)), 0.0
+        )
         factors = np.tile(1.0 + WEIGHT * np.minimum(costs, 1.0), (4, 1))
         for factor, (cosine, sine) in zip(factors, DIRECTIONS, strict=True):
-            tight = (np.abs(cosine * dx + sine * dy) < self._reach) & (np.abs(cosine * dy - sine * dx) < self._side)
+            tight = (np.abs(cosine * dx + sine * dy) < self._reach) & (
+                np.abs(cosine * dy - sine * dx) < self._side
+            )
             is_tight = np.zeros(count * count, dtype=bool)
             is_tight[numbers[tight]] = True
             factor[is_tight] *= TIGHT
@@ -303,10 +328,17 @@ class Planner:
                 continue
             tries = here + np.outer(STRAIGHT_ON, way / np.hypot(*way))
             # Beside the robot as it stands now there may be no room for it to be turned.
-            on = [0.0 if number + 2 * side - 1 == 0 else self._reach for side in (narrow, 1 - narrow)]
+            on = [
+                0.0 if number + 2 * side - 1 == 0 else self._reach for side in (narrow, 1 - narrow)
+            ]
             ends = np.repeat([sides[narrow], sides[1 - narrow]], len(tries), axis=0)
             free, _ = legs_beside(
-                points, np.tile(tries, (2, 1)), ends, self._reach, np.repeat(on, len(tries)), self._side
+                points,
+                np.tile(tries, (2, 1)),
+                ends,
+                self._reach,
+                np.repeat(on, len(tries)),
+                self._side,
             )
             # The cosines of the angles by which the path then turns there.
             come = tries - sides[narrow]

@@ -82,8 +82,12 @@ class Links:
     @classmethod
     def of(cls, models: Sequence[Body]) -> Links:
         bounds = [bounds for model in models for bounds in model.bounds]
-        centers = np.array([(one[0] + one[1]) / 2 if one else np.zeros(3) for one in bounds]).reshape(-1, 3)
-        halves = np.array([(one[1] - one[0]) / 2 if one else np.full(3, NOTHING) for one in bounds]).reshape(-1, 3)
+        centers = np.array(
+            [(one[0] + one[1]) / 2 if one else np.zeros(3) for one in bounds]
+        ).reshape(-1, 3)
+        halves = np.array(
+            [(one[1] - one[0]) / 2 if one else np.full(3, NOTHING) for one in bounds]
+        ).reshape(-1, 3)
         return cls(
             bodies=tuple(link for model in models for link in model.links),
             first=np.cumsum([0, *(len(model.links) for model in models)], dtype=int)[:-1],
@@ -97,12 +101,24 @@ class Links:
         poses = [plant.EvalBodyPoseInWorld(context, self.bodies[number]) for number in numbers]
         turns = np.array([pose.rotation().matrix() for pose in poses]).reshape(-1, 3, 3)
         places = np.array([pose.translation() for pose in poses]).reshape(-1, 3)
-        rates = [plant.EvalBodySpatialVelocityInWorld(context, self.bodies[number]) for number in numbers]
-        turning = np.linalg.norm(np.array([rate.rotational() for rate in rates]).reshape(-1, 3), axis=1)
-        moving = np.linalg.norm(np.array([rate.translational() for rate in rates]).reshape(-1, 3), axis=1)
+        rates = [
+            plant.EvalBodySpatialVelocityInWorld(context, self.bodies[number]) for number in numbers
+        ]
+        turning = np.linalg.norm(
+            np.array([rate.rotational() for rate in rates]).reshape(-1, 3), axis=1
+        )
+        moving = np.linalg.norm(
+            np.array([rate.translational() for rate in rates]).reshape(-1, 3), axis=1
+        )
         centers = np.einsum("nij,nj->ni", turns, self.centers[numbers]) + places
         halves = np.einsum("nij,nj->ni", np.abs(turns), self.halves[numbers])
-        return Motion(low=centers - halves, high=centers + halves, speed=moving + turning * self.reach[numbers], places=places, turns=turns)
+        return Motion(
+            low=centers - halves,
+            high=centers + halves,
+            speed=moving + turning * self.reach[numbers],
+            places=places,
+            turns=turns,
+        )
 
     def ways(self, numbers: Sequence[int] | slice, before: Motion, after: Motion) -> Floats:
         """How far (K,) each link's farthest point has moved between two motions, m.
@@ -129,7 +145,9 @@ def gaps(a: Links, of_a: Motion, b: Links, of_b: Motion) -> Floats:
 
     Below 0 where boxes overlap.
     """
-    apart = np.maximum(of_a.low[:, None] - of_b.high[None], of_b.low[None] - of_a.high[:, None]).max(axis=2)
+    apart = np.maximum(
+        of_a.low[:, None] - of_b.high[None], of_b.low[None] - of_a.high[:, None]
+    ).max(axis=2)
     rows: Floats = np.minimum.reduceat(apart, a.first, axis=0)
     return np.minimum.reduceat(rows, b.first, axis=1)
 
@@ -157,7 +175,9 @@ def tight_gaps(a: Links, of_a: Motion, b: Links, of_b: Motion, wanted: Booleans)
             np.einsum("nkj,nj->nk", np.abs(np.einsum("nka,nja->nkj", axes, each)), halves)
             for each, halves in ((own, a.halves[rows]), (others, b.halves[columns]))
         ]
-        apart[rows, columns] = (np.abs(np.einsum("nka,na->nk", axes, way)) - spans[0] - spans[1]).max(axis=1)
+        apart[rows, columns] = (
+            np.abs(np.einsum("nka,na->nk", axes, way)) - spans[0] - spans[1]
+        ).max(axis=1)
     least: Floats = np.minimum.reduceat(apart, a.first, axis=0)
     return np.minimum.reduceat(least, b.first, axis=1)
 
@@ -229,5 +249,9 @@ class Script:
     @property
     def size(self) -> int:
         """About how much memory it takes, bytes."""
-        arrays = [self.states, *self.paces, *(part for motion in self.motions for part in vars(motion).values())]
+        arrays = [
+            self.states,
+            *self.paces,
+            *(part for motion in self.motions for part in vars(motion).values()),
+        ]
         return sum(array.nbytes + 128 for array in arrays)

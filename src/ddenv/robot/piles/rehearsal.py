@@ -70,9 +70,15 @@ class Repertoire:
 
         Without these the pile would move otherwise than in the whole world. Empty while `usual` is unknown.
         """
-        return {name: near.union(names) - {name} for names, near in (self.usual or {}).items() for name in names}
+        return {
+            name: near.union(names) - {name}
+            for names, near in (self.usual or {}).items()
+            for name in names
+        }
 
-    def unusual(self, piles: Iterable[Known], present: frozenset[str], held: frozenset[str]) -> frozenset[str]:
+    def unusual(
+        self, piles: Iterable[Known], present: frozenset[str], held: frozenset[str]
+    ) -> frozenset[str]:
         """The models of those among `piles` that do not move as in the whole world, and the static ones near them.
 
         `present` are the models that are kept. A pile with one of `held`, which have no twin, counts as well: where such a door was
@@ -82,9 +88,12 @@ class Repertoire:
         other = (
             known
             for known in piles
-            if not usual.get(known.names, known.near | {""}) <= present or not held.isdisjoint(known.names)
+            if not usual.get(known.names, known.near | {""}) <= present
+            or not held.isdisjoint(known.names)
         )
-        return frozenset(name for known in other for name in (*known.names, *(known.near & present)))
+        return frozenset(
+            name for known in other for name in (*known.names, *(known.near & present))
+        )
 
     def find(self, names: Names, present: frozenset[str]) -> Known | None:
         """The script of the pile `names` in a world that keeps the models `present`; None if it has to be rehearsed."""
@@ -93,7 +102,9 @@ class Repertoire:
                 return known
         return None
 
-    def add(self, names: Names, present: frozenset[str], script: Script | None, margin: float) -> Known:
+    def add(
+        self, names: Names, present: frozenset[str], script: Script | None, margin: float
+    ) -> Known:
         """Stores the script of a pile that can touch what is within `margin` (m) of its links."""
         near = frozenset(self._static)
         if script is not None:
@@ -101,7 +112,9 @@ class Repertoire:
             low = low - margin
             high = high + margin
             boxes = [(name, box) for name, box in self._static.items() if box]
-            near = frozenset(name for name, box in boxes if (box[0] < high).all() and (low < box[1]).all())
+            near = frozenset(
+                name for name, box in boxes if (box[0] < high).all() and (low < box[1]).all()
+            )
         known = Known(names, near, near & present, script)
         self._known.setdefault(names, []).append(known)
         # A pile that cannot be rehearsed takes memory, too: the names of all models that stay.
@@ -144,7 +157,9 @@ class Rehearsals:
         """Lets the repertoire know the piles of the whole world, with the models `present`, which this plant has."""
         if self._repertoire.usual is None:
             self._context.presence.remove(frozenset())
-            self._repertoire.usual = {known.names: known.near for known in self.piles(self._bodies, present)}
+            self._repertoire.usual = {
+                known.names: known.near for known in self.piles(self._bodies, present)
+            }
 
     def piles(self, kept: Sequence[Body], present: frozenset[str]) -> list[Known]:
         """All piles of `kept` that start away from the robot, in a world that keeps the models `present`.
@@ -166,7 +181,10 @@ class Rehearsals:
         joined = self._apart < NEAR
         while True:
             piles = self._piles(everything, joined, np.ones(len(everything), dtype=bool))
-            settled = [(pile, known.script) for pile, known in zip(piles, self._known(piles, present), strict=True)]
+            settled = [
+                (pile, known.script)
+                for pile, known in zip(piles, self._known(piles, present), strict=True)
+            ]
             meeting = joined | self._meetings(settled)
             if (meeting == joined).all():
                 return settled
@@ -190,7 +208,10 @@ class Rehearsals:
             gone = last.below(context.floor)
             for body, rests in zip(pile, script.resting, strict=True):
                 links = range(first, first := first + len(body.links))
-                turns = (RotationMatrix(last.turns[link]).ToQuaternion().wxyz().tolist() for link in links)
+                turns = (
+                    RotationMatrix(last.turns[link]).ToQuaternion().wxyz().tolist()
+                    for link in links
+                )
                 places[body.name] = tuple(
                     Pose(vector(last.places[link]), (w, x, y, z))
                     for link, (w, x, y, z) in zip(links, turns, strict=True)
@@ -203,7 +224,10 @@ class Rehearsals:
         return Settled(
             seconds=seconds,
             places={name: places[name] for name in in_order if name in places},
-            **{kind: tuple(name for name in in_order if name in names) for kind, names in found.items()},
+            **{
+                kind: tuple(name for name in in_order if name in names)
+                for kind, names in found.items()
+            },
         )
 
     def supports(self, present: frozenset[str], elements: frozenset[str]) -> list[tuple[str, str]]:
@@ -227,7 +251,9 @@ class Rehearsals:
                     values = hold.start[entries]
                     if script is not None:
                         ticks = self._context.clock.ticks[: len(script.states)]
-                        values = script.states[sum(tick.time < ticks[-1].time - back for tick in ticks)]
+                        values = script.states[
+                            sum(tick.time < ticks[-1].time - back for tick in ticks)
+                        ]
                     hold.put(entries, values)
                 hold.apply()
                 self._note_contacts(below)
@@ -249,7 +275,10 @@ class Rehearsals:
         built = self._context.built
         # The robot's shapes are missing.
         model_of = {shape: name for name, identities in built.shapes() for shape in identities}
-        query = cast(QueryObject, built.plant.get_geometry_query_input_port().Eval(self._context.plant_context))
+        query = cast(
+            QueryObject,
+            built.plant.get_geometry_query_input_port().Eval(self._context.plant_context),
+        )
         for contact in query.ComputePointPairPenetration():
             first = model_of.get(contact.id_A)
             second = model_of.get(contact.id_B)
@@ -276,9 +305,14 @@ class Rehearsals:
         return near
 
     def _known(self, piles: Sequence[tuple[Body, ...]], present: frozenset[str]) -> list[Known]:
-        return [self._repertoire.find(_names(pile), present) or self._rehearse(pile, present) for pile in piles]
+        return [
+            self._repertoire.find(_names(pile), present) or self._rehearse(pile, present)
+            for pile in piles
+        ]
 
-    def _piles(self, numbers: Sequence[int], joined: Booleans, left: Booleans) -> list[tuple[Body, ...]]:
+    def _piles(
+        self, numbers: Sequence[int], joined: Booleans, left: Booleans
+    ) -> list[tuple[Body, ...]]:
         """The moving models `numbers` (K,) in the groups that `joined` (K, K) makes of them; only groups that are `left` (K,)."""
         left = left.copy()
         piles = []
@@ -286,7 +320,13 @@ class Rehearsals:
             one = np.zeros_like(left)
             one[left.argmax()] = True
             pile = spread(one, joined)
-            piles.append(tuple(self._bodies[number] for number, member in zip(numbers, pile, strict=True) if member))
+            piles.append(
+                tuple(
+                    self._bodies[number]
+                    for number, member in zip(numbers, pile, strict=True)
+                    if member
+                )
+            )
             left &= ~pile
         return piles
 
@@ -308,7 +348,9 @@ class Rehearsals:
             if context.region is not None:
                 for motion in script.motions:
                     context.region.check((motion.low, motion.high))
-            margin = NEAR + max(motion.speed.max() for motion in script.motions) * context.clock.period
+            margin = (
+                NEAR + max(motion.speed.max() for motion in script.motions) * context.clock.period
+            )
         return self._repertoire.add(_names(pile), present, script, margin)
 
     def _rows(self, pile: tuple[Body, ...], sleep: Sleep) -> Script:
@@ -332,7 +374,13 @@ class Rehearsals:
             paces.append(sleep.pace.copy())
             if sleep.at_rest.all() or tick.time >= self._longest:
                 break
-        return Script(names=_names(pile), states=np.array(states), motions=tuple(motions), paces=tuple(paces), resting=sleep.at_rest)
+        return Script(
+            names=_names(pile),
+            states=np.array(states),
+            motions=tuple(motions),
+            paces=tuple(paces),
+            resting=sleep.at_rest,
+        )
 
 
 def _names(pile: Iterable[Body]) -> Names:

@@ -17,7 +17,17 @@ from pydrake.multibody.plant import ContactResults
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.drake.plant import Body
 from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.piles.motion import NEAR, SLOW, Links, Motion, Script, Stillness, gaps, spread, tight_gaps
+from ddenv.robot.piles.motion import (
+    NEAR,
+    SLOW,
+    Links,
+    Motion,
+    Script,
+    Stillness,
+    gaps,
+    spread,
+    tight_gaps,
+)
 from ddenv.world.extent import Bounds
 
 TOUCH = 0.02  # m; models this near to each other may touch
@@ -61,8 +71,12 @@ class Sleep:
         self._entries = [hold.entries([body]) for body in kept]
         number_of = {body.name: number for number, body in enumerate(kept)}
         self._scripts = [(script, [number_of[name] for name in script.names]) for script in scripts]
-        self._entries_of = [hold.entries([kept[number] for number in members]) for _, members in self._scripts]
-        self._has_twin: Booleans = np.array([body.name in context.built.twins for body in kept], dtype=bool)
+        self._entries_of = [
+            hold.entries([kept[number] for number in members]) for _, members in self._scripts
+        ]
+        self._has_twin: Booleans = np.array(
+            [body.name in context.built.twins for body in kept], dtype=bool
+        )
         # The state of what is not simulated, where it really is.
         self._real = hold.start.copy()
         self._away: Booleans = np.zeros(len(hold.start), dtype=bool)
@@ -111,7 +125,9 @@ class Sleep:
         """The lowest and the highest corners, (M, 3) m each, of the boxes around the kept models at the last tick."""
         low = self.motion.low
         high = self.motion.high
-        return np.minimum.reduceat(low, self._links.first), np.maximum.reduceat(high, self._links.first)
+        return np.minimum.reduceat(low, self._links.first), np.maximum.reduceat(
+            high, self._links.first
+        )
 
     def awake_links(self) -> tuple[Floats, Floats, Floats]:
         """The K links that are simulated, at the last tick: corners (K, 3) m and (K, 3) m of the boxes around them, and bounds of
@@ -137,7 +153,9 @@ class Sleep:
     def end(self) -> None:
         """Leaves the context without any moving model that something could touch."""
         self._twins.lift_all()
-        self._presence.part([body for body, awake in zip(self._kept, self._awake, strict=True) if awake], ())
+        self._presence.part(
+            [body for body, awake in zip(self._kept, self._awake, strict=True) if awake], ()
+        )
 
     def _play(self) -> None:
         """Moves the models that are played back to where their scripts have them now."""
@@ -160,13 +178,17 @@ class Sleep:
         for number in models:
             if self._has_twin[number] and not self._gone[number]:
                 links = self._links.of_models([number])
-                self._twins.lay(self._kept[number], self.motion.places[links], self.motion.turns[links])
+                self._twins.lay(
+                    self._kept[number], self.motion.places[links], self.motion.turns[links]
+                )
 
     def _hold_still(self, models: Iterable[int]) -> None:
         """Holds the bodies of `models`: away from everything, or where they are if they have no twin."""
         for number in models:
             entries = self._entries[number]
-            self._hold.put(entries, (self._hold.away if self._has_twin[number] else self._real)[entries])
+            self._hold.put(
+                entries, (self._hold.away if self._has_twin[number] else self._real)[entries]
+            )
 
     def _look(self, models: Integers, seconds: float) -> None:
         """Observes `models` (K,) in the simulation, `seconds` after the last time."""
@@ -195,12 +217,16 @@ class Sleep:
         together = played[:, None] & (self._played[:, None] == self._played)
         touching: Booleans = apart < TOUCH
         lively: Booleans = moving & ~slow
-        stirring: Booleans = (apart < NEAR + (speed[:, None] + speed) * self._period) & (lively[:, None] | lively)
+        stirring: Booleans = (apart < NEAR + (speed[:, None] + speed) * self._period) & (
+            lively[:, None] | lively
+        )
         meeting = (stirring | (touching & (moving[:, None] | moving))) & ~together
         # What lies as part of the ground can be touched there: only what comes fast wakes it before it does.
         met: Booleans = meeting.any(axis=1) & ~self._settled | self._struck(apart)
         # Something that is simulated may touch it before the tick after next.
-        beside = apart[:, self._awake] < TOUCH + (speed[:, None] + speed[self._awake]) * self._period
+        beside = (
+            apart[:, self._awake] < TOUCH + (speed[:, None] + speed[self._awake]) * self._period
+        )
         self._took_part |= near | beside.any(axis=1)
         self._stillness.look(self.motion, seconds)
         within = self._settled & (near | touching[:, self._awake].any(axis=1))
@@ -232,10 +258,14 @@ class Sleep:
         margin = (speed + robot.speed[0]) * self._period
         wanted = gaps(self._robot, robot, self._links, self.motion) < NEAR + margin
         apart = tight_gaps(self._robot, robot, self._links, self.motion, wanted)[0]
-        place = np.concatenate([robot.places[0], (robot.turns[0] * self._robot.reach[0] / np.sqrt(2.0)).ravel()])
+        place = np.concatenate(
+            [robot.places[0], (robot.turns[0] * self._robot.reach[0] / np.sqrt(2.0)).ravel()]
+        )
         passing = np.linalg.norm(self._robot_was - place, axis=1) > PASSED
         lies = self._settled
-        close: Booleans = (apart < np.where(lies, CLOSE, NEAR) + margin) & (passing | ~lies) & ~self._gone
+        close: Booleans = (
+            (apart < np.where(lies, CLOSE, NEAR) + margin) & (passing | ~lies) & ~self._gone
+        )
         self._robot_was[close | self._awake] = place
         near: Booleans = (apart < TOUCH + margin) & ~self._gone
         return near, close
@@ -318,7 +348,9 @@ class Loads:
             if body.name in built.twins
             for shape in built.twins[body.name].geometry
         }
-        self._weights = GRAVITY * np.array([sum(link.default_mass() for link in body.links) for body in models])
+        self._weights = GRAVITY * np.array(
+            [sum(link.default_mass() for link in body.links) for body in models]
+        )
         down = cast(Floats, built.plant.gravity_field().gravity_vector())
         self._up = -down / max(float(np.linalg.norm(down)), 1e-9)
         self._bears = BEARS * self._weights

@@ -51,7 +51,9 @@ class SensorSuite:
 
     def __init__(self, settings: Sensors, seed: int) -> None:
         self._settings = settings
-        *own, self.lidar = (np.random.default_rng(each) for each in np.random.SeedSequence(seed).spawn(4))
+        *own, self.lidar = (
+            np.random.default_rng(each) for each in np.random.SeedSequence(seed).spawn(4)
+        )
         self._compass, self._imu, self._odometry = (noise(random) for random in own)
         # Drawn first, once a run: the compass's misalignment, the gyro's drift, the wear of the tyres.
         self._heading_bias = settings.compass_bias * next(self._compass)
@@ -116,10 +118,16 @@ class Filter:
 
     @property
     def estimate(self) -> Estimate:
-        spread = math.sqrt(max(self._xx, 0.0)), math.sqrt(max(self._yy, 0.0)), math.sqrt(max(self._hh, 0.0))
+        spread = (
+            math.sqrt(max(self._xx, 0.0)),
+            math.sqrt(max(self._yy, 0.0)),
+            math.sqrt(max(self._hh, 0.0)),
+        )
         return Estimate(self._x, self._y, self._heading, self._speed, self._rate, spread)
 
-    def advance(self, speed: float, wheel_rate: float, gyro_rate: float, pitch: float, seconds: float) -> None:
+    def advance(
+        self, speed: float, wheel_rate: float, gyro_rate: float, pitch: float, seconds: float
+    ) -> None:
         """The prediction: `seconds` pass at the wheels' `speed` (m/s).
 
         `wheel_rate` and `gyro_rate` (rad/s) are the turn rates from wheels and gyro, `pitch` (rad) is the robot's pitch.

@@ -18,7 +18,19 @@ import numpy as np
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.text import Names
 from ddenv.world.extent import shape_bounds
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere, Terrain, World, still_links
+from ddenv.world.model import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    Mesh,
+    Plane,
+    Shape,
+    Sphere,
+    Terrain,
+    World,
+    still_links,
+)
 from ddenv.world.pose import HERE, Pose, Vector, vector
 from ddenv.world.scenario import Lidar
 from ddenv.world.terrain import bilinear
@@ -77,7 +89,9 @@ class Shapes:
             squares=self.squares.take(rows, axis=1),
             reaches=self.reaches[rows],
             lengths=self.lengths[rows],
-            facets={new: self.facets[old] for new, old in enumerate(rows.tolist()) if old in self.facets},
+            facets={
+                new: self.facets[old] for new, old in enumerate(rows.tolist()) if old in self.facets
+            },
         )
 
 
@@ -107,7 +121,9 @@ class Obstacles:
                     found.append((owner, -1 if fixed else number, one.shape, pose))
         found.sort(key=lambda one: KIND_OF[type(one[2])])
         owners, links, shapes, poses = zip(*found, strict=True) if found else ((), (), (), ())
-        sizes = np.maximum(np.array([_extent(shape)[1] for shape in shapes]).reshape(-1, 3), THINNEST)
+        sizes = np.maximum(
+            np.array([_extent(shape)[1] for shape in shapes]).reshape(-1, 3), THINNEST
+        )
         halves = sizes.T.copy()
         squares = halves * halves
         turns = np.array([pose.rotation() for pose in poses]).reshape(-1, 3, 3).transpose(1, 2, 0)
@@ -179,17 +195,26 @@ def pill(start: Floats, way: Floats, lengths: Floats) -> Interval:
     start[2] *= lengths
     way[2] *= lengths
     ends = np.maximum(lengths - 1.0, SHORTEST)
-    parts = [tube(np.stack([start[0], start[1], start[2] / ends]), np.stack([way[0], way[1], way[2] / ends]))]
+    parts = [
+        tube(
+            np.stack([start[0], start[1], start[2] / ends]),
+            np.stack([way[0], way[1], way[2] / ends]),
+        )
+    ]
     for end in (-ends, ends):
         parts.append(ball(np.stack([start[0], start[1], start[2] - end]), way))
     missed = [enter > leave for enter, leave in parts]
     enters = [np.where(miss, np.inf, enter) for miss, (enter, _) in zip(missed, parts, strict=True)]
-    leaves = [np.where(miss, -np.inf, leave) for miss, (_, leave) in zip(missed, parts, strict=True)]
+    leaves = [
+        np.where(miss, -np.inf, leave) for miss, (_, leave) in zip(missed, parts, strict=True)
+    ]
     return np.min(enters, axis=0), np.max(leaves, axis=0)
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    dot: Floats = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] if len(a) == 3 else a[0] * b[0] + a[1] * b[1]
+    dot: Floats = (
+        a[0] * b[0] + a[1] * b[1] + a[2] * b[2] if len(a) == 3 else a[0] * b[0] + a[1] * b[1]
+    )
     return dot
 
 
@@ -222,7 +247,9 @@ class Facets:
     def cast(self, start: Floats, way: Floats, normal: Floats, _range: float) -> Interval:
         """Where beams from `start` (3,) along `way` (3, P), orthogonal to `normal` (3,), enter and leave."""
         corners = self.corners - start[:, None]
-        heights = (normal[0] * corners[0] + normal[1] * corners[1] + normal[2] * corners[2])[self.faces]
+        heights = (normal[0] * corners[0] + normal[1] * corners[1] + normal[2] * corners[2])[
+            self.faces
+        ]
         (cut,) = ((heights.min(axis=0) <= 0) & (heights.max(axis=0) >= 0)).nonzero()
         if not len(cut):
             return np.full(way.shape[1], np.inf), np.full(way.shape[1], -np.inf)
@@ -245,7 +272,9 @@ class Relief:
     def of(cls, terrain: Terrain, middle: Floats, half: Floats) -> Relief:
         """The relief of terrain, whose box has its centre at `middle` (3,) m and half the size `half` (3,) m."""
         counts = np.array(terrain.heights.shape[::-1]) - 1
-        return cls((terrain.heights - middle[2]) / half[2], float((np.array(terrain.size) / counts).min()))
+        return cls(
+            (terrain.heights - middle[2]) / half[2], float((np.array(terrain.size) / counts).min())
+        )
 
     def cast(self, start: Floats, way: Floats, _normal: Floats, reach: float) -> Interval:
         """Where beams from `start` (3,) along `way` (3, P), which are `reach` m long, meet the surface; they do not leave it."""
@@ -267,7 +296,9 @@ class Relief:
 CURVED: dict[type, type[Facets] | type[Relief]] = {Mesh: Facets, Terrain: Relief}
 
 
-TURNS = np.array([[-math.tau], [0.0], [math.tau]])  # directions that differ by a full turn are the same
+TURNS = np.array(
+    [[-math.tau], [0.0], [math.tau]]
+)  # directions that differ by a full turn are the same
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -301,7 +332,9 @@ class Fan:
         return counts.reshape(-1, 3).sum(axis=1), beams + np.arange(len(beams))
 
 
-def cast(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> tuple[Floats, Integers, Integers]:
+def cast(
+    fan: Fan, shapes: Shapes, origin: Floats, axes: Floats
+) -> tuple[Floats, Integers, Integers]:
     """Casts the beams of one scan from `origin` (3,) m, in the world frame; `axes` (3, 3) are the lidar's axes, as rows.
 
     Returns how far the beams go, (B,) m, infinite where they hit nothing; the numbers (N,) of the beams that end on a shape; and
@@ -354,7 +387,12 @@ def _cross(fan: Fan, shapes: Shapes, local: Floats, counts: Integers, beams: Int
     ends = [0, *counts.cumsum().tolist()]
     parts = [slice(ends[first], ends[last]) for first, last in pairwise(shapes.firsts)]
     lengths = shapes.lengths.repeat(counts)[parts[PILL]]
-    crossings: tuple[Callable[[Floats, Floats], Interval], ...] = (cube, ball, tube, partial(pill, lengths=lengths))
+    crossings: tuple[Callable[[Floats, Floats], Interval], ...] = (
+        cube,
+        ball,
+        tube,
+        partial(pill, lengths=lengths),
+    )
     for part, crossing in zip(parts, crossings, strict=False):
         if part.start < part.stop:
             enter[part], leave[part] = crossing(start[:, part], way[:, part])

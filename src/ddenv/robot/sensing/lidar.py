@@ -57,7 +57,9 @@ class Lidar:
         firsts = accumulate((len(model.links) for model in moving), initial=0)
         first = {model.name: first for model, first in zip(moving, firsts, strict=False)}
         owners = [obstacles.names[owner] for owner in self._owners[self._movers]]
-        self._links = obstacles.links[rows][self._movers] + np.array([first[name] for name in owners], dtype=int)
+        self._links = obstacles.links[rows][self._movers] + np.array(
+            [first[name] for name in owners], dtype=int
+        )
         # In the frames of their links, which do not change during the run.
         self._centers = self._shapes.centers[:, self._movers]
         self._frames = self._shapes.frames[:, :, self._movers]
@@ -65,7 +67,11 @@ class Lidar:
     @property
     def took_part(self) -> dict[str, float]:
         """The models without which a scan that was read would be another, each with the time (s) of the first one."""
-        return {name: at for name, at in zip(self._names, self._read.tolist(), strict=True) if at < np.inf}
+        return {
+            name: at
+            for name, at in zip(self._names, self._read.tolist(), strict=True)
+            if at < np.inf
+        }
 
     def scan(self, now: float, pose: PoseRow, places: Floats, turns: Floats) -> Scan:
         """The scan at the time `now` (s).
@@ -86,9 +92,13 @@ class Lidar:
             for _, owner in sorted(zip(beams[met].tolist(), owners[met].tolist(), strict=True)):
                 self._unseen[owner] = False
                 self.first_seen.setdefault(self._names[owner], now)
-        return LazyScan(now, self._fan.angles, partial(self._ranges, now, measure), self._mount.position)
+        return LazyScan(
+            now, self._fan.angles, partial(self._ranges, now, measure), self._mount.position
+        )
 
-    def _ranges(self, now: float, measure: Callable[[], Measured], limits: Floats | None = None) -> Floats:
+    def _ranges(
+        self, now: float, measure: Callable[[], Measured], limits: Floats | None = None
+    ) -> Floats:
         """The ranges of the scan at `now` (s), infinite where they exceed `limits` (B,) m."""
         ranges, measured, beams, owners = measure()
         if limits is not None:
@@ -101,7 +111,9 @@ class Lidar:
 
     def _measure(self, number: int, place: Pose, shapes: Shapes, models: Integers) -> Measured:
         """Makes scan `number` from `place`; its beams may hit the `shapes` (K,) of these `models` (K,)."""
-        distances, beams, hit = cast(self._fan, shapes, np.array(place.position), place.rotation().T)
+        distances, beams, hit = cast(
+            self._fan, shapes, np.array(place.position), place.rotation().T
+        )
         # The errors of the ranges are the same whatever the beams hit, and whichever scans are computed.
         bits: Any = self._random.bit_generator
         bits.state = self._state
@@ -117,7 +129,9 @@ class Lidar:
         turn = turns[self._links].transpose(1, 2, 0)
         first, second, third = (turn[:, axis] for axis in range(3))
         a, b, c = self._centers
-        self._shapes.centers[:, self._movers] = first * a + second * b + third * c + places[self._links].T
+        self._shapes.centers[:, self._movers] = (
+            first * a + second * b + third * c + places[self._links].T
+        )
         a, b, c = self._frames
         frames = first[:, None] * a + second[:, None] * b + third[:, None] * c
         self._shapes.frames[:, :, self._movers] = frames
@@ -129,7 +143,9 @@ class LazyScan(Scan):
     __slots__ = ("_ranges",)
     _ranges: Callable[..., Floats] | Floats
 
-    def __init__(self, time: float, angles: Floats, ranges: Callable[..., Floats] | Floats, origin: Vector) -> None:
+    def __init__(
+        self, time: float, angles: Floats, ranges: Callable[..., Floats] | Floats, origin: Vector
+    ) -> None:
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "angles", angles)
         object.__setattr__(self, "_ranges", ranges)
@@ -154,7 +170,9 @@ def in_the_way(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> Intege
     # A matrix product may round differently among more shapes: nothing else is computed from this one.
     ahead, left, above = axes @ (shapes.centers - origin[:, None])
     far = shapes.reaches + fan.range
-    numbers: Integers = ((np.abs(above) <= shapes.reaches) & (ahead * ahead + left * left <= far * far)).nonzero()[0]
+    numbers: Integers = (
+        (np.abs(above) <= shapes.reaches) & (ahead * ahead + left * left <= far * far)
+    ).nonzero()[0]
     frames = shapes.frames.take(numbers, axis=2)
     away = origin[:, None] - shapes.centers.take(numbers, axis=1)
     local = (away[:, None] * frames).sum(axis=0)
@@ -164,5 +182,7 @@ def in_the_way(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> Intege
     cut = np.abs((edges * local).sum(axis=0)) <= np.abs(edges).sum(axis=0) + SPARE
     # How far the beams get along each of a shape's axes: a ground may be at the right height, but beyond their range.
     extents = np.sqrt(np.maximum((frames * frames).sum(axis=0) - up * up, 0.0))
-    met: Booleans = cut & (np.abs(local) - 1.0 <= extents * (fan.range * (1.0 + SPARE)) + SPARE).all(axis=0)
+    met: Booleans = cut & (
+        np.abs(local) - 1.0 <= extents * (fan.range * (1.0 + SPARE)) + SPARE
+    ).all(axis=0)
     return numbers[met]

@@ -48,7 +48,9 @@ class Notice:
         still = {name: box for name, box in boxes.items() if name in present}
         self._names = np.array([*still, *(body.name for body in kept)], dtype=object)
         self._low, self._high = stacked(still.values())
-        self._unseen: Booleans = np.array([True] * len(still) + [any(body.bounds) for body in kept], dtype=bool)
+        self._unseen: Booleans = np.array(
+            [True] * len(still) + [any(body.bounds) for body in kept], dtype=bool
+        )
 
     def feel(self, now: float) -> None:
         """Notes what the robot touches at the time `now` (s).
@@ -69,7 +71,11 @@ class Notice:
                 name = self._owners.get(other.get_value())
                 other = pair.id_A
             # Most contacts are with the ground that the robot stands on: they fail the cheaper checks, which come first.
-            if name is not None and name not in self.first_touched and other.get_value() in self._robot:
+            if (
+                name is not None
+                and name not in self.first_touched
+                and other.get_value() in self._robot
+            ):
                 self.first_touched[name] = now
 
     def look(self, now: float, place: Vector, heading: float) -> None:
@@ -83,7 +89,9 @@ class Notice:
         high = np.vstack([self._high, high])
         eye = np.array(place)
         direction = np.array(heading)
-        seen = in_view(low[unseen], high[unseen], eye, direction, sensors.view_range, sensors.view_angle)
+        seen = in_view(
+            low[unseen], high[unseen], eye, direction, sensors.view_range, sensors.view_angle
+        )
         for name in self._names[unseen][seen]:
             self._first_seen.setdefault(name, now)
             self._unseen &= self._names != name
@@ -101,7 +109,9 @@ class Notice:
 PARALLEL = 1e-12
 
 
-def in_view(low: Floats, high: Floats, eye: Floats, heading: Floats, view_range: float, view_angle: float) -> Booleans:
+def in_view(
+    low: Floats, high: Floats, eye: Floats, heading: Floats, view_range: float, view_angle: float
+) -> Booleans:
     """Which boxes (...) are partly in view of `eye`: within `view_range` (m) and, seen from above, in the field of view.
 
     `low` and `high` (..., 3) m are the boxes' corners, `eye` (..., 3) m is the viewpoint and `heading` (...) rad the middle of the
@@ -140,7 +150,9 @@ def _entry(low: Floats, high: Floats, direction: Floats) -> Floats:
 def still_boxes(world: World) -> dict[str, Bounds]:
     """The boxes around the parts of models that never move, without planes, by model."""
     boxes = {
-        model.name: bounds(collision for link in still_links(model) for collision in link.collisions)
+        model.name: bounds(
+            collision for link in still_links(model) for collision in link.collisions
+        )
         for model in world.models
     }
     return {name: box for name, box in boxes.items() if box is not None}

@@ -28,7 +28,9 @@ from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario
 
 UNSOLVED = "did not converge"  # in what Drake's solver says when it finds no contact forces
-LONGEST_LOOK = 10.0  # the maximum real time between two recorded poses that counts as time of the run, s
+LONGEST_LOOK = (
+    10.0  # the maximum real time between two recorded poses that counts as time of the run, s
+)
 # The outcome, the failure, and whether the run was cut short.
 End = tuple[str, str, bool]
 
@@ -84,7 +86,11 @@ class Run:
         outcome, failure, cut, seconds = self._loop(progress or (lambda *_: None))
         trajectory = self._recording.trajectory()
         if outcome == "failed":
-            whole = np.vstack([trajectory, [self.context.clock.seconds, *trajectory[-1, 1:]]]) if cut else trajectory
+            whole = (
+                np.vstack([trajectory, [self.context.clock.seconds, *trajectory[-1, 1:]]])
+                if cut
+                else trajectory
+            )
             failure = kind_of(whole, fell=failure == "fell", arrived=self.autonomy.arrived)
         seen = self.lidar.first_seen if self.lidar else {}
         took_part = None
@@ -187,12 +193,16 @@ class Run:
         if not self.kept:
             return problem
         lightest = min(self.kept, key=_mass)
-        return f"{problem}; the lightest loose model, '{lightest.name}', has {_mass(lightest):.3g} kg"
+        return (
+            f"{problem}; the lightest loose model, '{lightest.name}', has {_mass(lightest):.3g} kg"
+        )
 
     def _command(self, tick: Tick) -> End | None:
         """Sets the wheel speeds that the controller wants. Returns how the run ends if the controller fails."""
         try:
-            speeds = self.drive.wheel_speeds(self.autonomy.command(tick), self.scenario.controller.skid)
+            speeds = self.drive.wheel_speeds(
+                self.autonomy.command(tick), self.scenario.controller.skid
+            )
         except BadCode as failed:
             return "error", str(failed), False
         # Setting the same speeds again would only make Drake compute everything anew.

@@ -26,9 +26,14 @@ SLACK = 0.05
 
 def solids(world: World) -> dict[str, Bounds]:
     """The boxes around the S shapes of each model that never move: corners (S, 3) m and (S, 3) m. There are no planes."""
-    shapes = {model.name: [one for link in still_links(model) for one in link.collisions] for model in world.models}
+    shapes = {
+        model.name: [one for link in still_links(model) for one in link.collisions]
+        for model in world.models
+    }
     return {
-        name: stacked(shape_bounds(one.shape, one.pose) for one in found) for name, found in shapes.items() if found
+        name: stacked(shape_bounds(one.shape, one.pose) for one in found)
+        for name, found in shapes.items()
+        if found
     }
 
 
@@ -40,7 +45,12 @@ class Reached:
     """
 
     def __init__(
-        self, boxes: Mapping[str, Bounds], hull: Hull, sleep: Sleep, present: frozenset[str], period: float
+        self,
+        boxes: Mapping[str, Bounds],
+        hull: Hull,
+        sleep: Sleep,
+        present: frozenset[str],
+        period: float,
     ) -> None:
         self._hull = hull
         self._sleep = sleep
@@ -73,13 +83,18 @@ class Reached:
         if not len(self._owners):
             return
         margin = SLACK + speed * self._period
-        if self._place is None or _moved(self._place, pose, self._hull.reach) + margin >= self._free:
+        if (
+            self._place is None
+            or _moved(self._place, pose, self._hull.reach) + margin >= self._free
+        ):
             self._look_around_robot(pose, margin)
         self._look_around_models()
 
     def _look_around_robot(self, pose: PoseRow, margin: float) -> None:
         low, high = self._hull.bounds(Pose(pose[:3], pose[3:]))
-        apart = np.maximum(low[:, None] - self._high, self._low - high[:, None]).max(axis=2).min(axis=0)
+        apart = (
+            np.maximum(low[:, None] - self._high, self._low - high[:, None]).max(axis=2).min(axis=0)
+        )
         near = apart <= margin
         self._place = pose
         self._free = float(apart[~np.isin(self._owners, self._owners[near])].min(initial=math.inf))
@@ -135,7 +150,11 @@ class Hull:
         low, high = stacked(_boxes(robot))
         centers = (low + high) / 2
         halves = (high - low) / 2
-        return cls(centers, halves, float(np.linalg.norm(np.abs(centers) + halves, axis=1).max(initial=0.0)))
+        return cls(
+            centers,
+            halves,
+            float(np.linalg.norm(np.abs(centers) + halves, axis=1).max(initial=0.0)),
+        )
 
     def bounds(self, place: Pose) -> Bounds:
         """The corners (B, 3) m and (B, 3) m of boxes along the world's axes around the boxes, with the first link at `place`."""

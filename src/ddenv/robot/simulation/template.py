@@ -34,7 +34,9 @@ from ddenv.world.pose import Point
 from ddenv.world.scenario import Scenario
 from ddenv.world.whole import whole_of
 
-YIELD = 0.1  # a margin for surfaces that sink into each other, and joints that exceed their limits, m
+YIELD = (
+    0.1  # a margin for surfaces that sink into each other, and joints that exceed their limits, m
+)
 
 
 class Template:
@@ -72,7 +74,9 @@ class Template:
         self._reach = self._hull.reach + YIELD
         # What decides in a run is known: no controller of the user's, and no model that collides with itself. (Where slices were
         # used beside such models, 23 of 274 implied tests differed.)
-        self.slices = scenario.controller.use in BUILT_IN and not any(model.self_collide for model in world.models)
+        self.slices = scenario.controller.use in BUILT_IN and not any(
+            model.self_collide for model in world.models
+        )
         moving = [model for model in world.models if not model.static]
         self._way = Region.of((spawn.x, spawn.y), (goal.x, goal.y), ())
         self._surround(Region.of((spawn.x, spawn.y), (goal.x, goal.y), moving))
@@ -102,7 +106,9 @@ class Template:
     def shapes_without(self, names: frozenset[str]) -> int:
         """The number of collision shapes in the plant, without those of the models `names`."""
         built = self.context.built
-        return len(built.robot.geometry) + sum(len(geometry) for name, geometry in built.shapes() if name not in names)
+        return len(built.robot.geometry) + sum(
+            len(geometry) for name, geometry in built.shapes() if name not in names
+        )
 
     def _surround(self, region: Region) -> None:
         """From the next `_build` on, the plant has nothing outside `region` that never moves."""
@@ -110,7 +116,9 @@ class Template:
         bounded = None if self._reach >= ENDLESS else region
         models = self._solid.models
         self._far = frozenset() if bounded is None else region.far(models)
-        self._grounds = {one.name: with_boxes(one, bounded, self._way) for one in models if has_terrain(one)}
+        self._grounds = {
+            one.name: with_boxes(one, bounded, self._way) for one in models if has_terrain(one)
+        }
 
     def _build(self, names: frozenset[str]) -> None:
         """Builds the plant with the models `names`. Everything else stays that of the whole world."""
@@ -120,7 +128,9 @@ class Template:
         world = replace(self._solid, models=tuple(near))
         scenario = self._scenario
         try:
-            built = build(world, self._robot, self._drive, scenario.simulation, scenario.controller.motor_gain)
+            built = build(
+                world, self._robot, self._drive, scenario.simulation, scenario.controller.motor_gain
+            )
         except (ValueError, RuntimeError, SystemExit) as error:
             raise UserError(f"{world.path}: cannot be simulated: {error}") from error
         if not built.robot.base.is_floating_base_body():
@@ -197,7 +207,9 @@ class Template:
     def _carriers(self, present: frozenset[str]) -> frozenset[str]:
         """What those models are tied to that are always kept, among the models `present`."""
         ties = self.repertoire.ties
-        return frozenset(name for always in self._always & set(ties) for name in ties[always] & present)
+        return frozenset(
+            name for always in self._always & set(ties) for name in ties[always] & present
+        )
 
 
 Result = TypeVar("Result")
@@ -233,7 +245,9 @@ class Variants:
     ) -> RunResult:
         """As `Template.run`, in a plant that has all that comes near."""
         self._learn_piles()
-        return self._within(lambda _: self._template(keep).run(keep, seed, progress, ends, listener))
+        return self._within(
+            lambda _: self._template(keep).run(keep, seed, progress, ends, listener)
+        )
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
         """Which models support which in the whole world; see `Rehearsals.supports`."""
@@ -252,7 +266,9 @@ class Variants:
             return None
         self._learn_piles()
         ties = self._whole.repertoire.ties
-        return sorted((name, other) for name in elements & set(ties) for other in elements & ties[name])
+        return sorted(
+            (name, other) for name in elements & set(ties) for other in elements & ties[name]
+        )
 
     def _learn_piles(self) -> None:
         """Finds out how the piles of the whole world move, if that is unknown."""

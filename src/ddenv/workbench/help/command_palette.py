@@ -26,21 +26,41 @@ class Commands(Provider):
 
     async def discover(self) -> Hits:
         for shortcut in commands(self.screen):
-            yield DiscoveryHit(Content(shortcut.words), self._run(shortcut), shortcut.words, f"key: {shortcut.keys}")
+            yield DiscoveryHit(
+                Content(shortcut.words),
+                self._run(shortcut),
+                shortcut.words,
+                f"key: {shortcut.keys}",
+            )
 
     async def search(self, query: str) -> Hits:
         matcher = self.matcher(query)
         for shortcut in commands(self.screen):
             score = matcher.match(shortcut.words)
             if score > ENOUGH:
-                yield Hit(score, Content(shortcut.words), self._run(shortcut), shortcut.words, f"key: {shortcut.keys}")
+                yield Hit(
+                    score,
+                    Content(shortcut.words),
+                    self._run(shortcut),
+                    shortcut.words,
+                    f"key: {shortcut.keys}",
+                )
         for name in theme_names():
             score = matcher.match(f"theme {name}")
             if score > ENOUGH:
-                yield Hit(score, Content(f"theme: {name}"), partial(setattr, self.app, "theme", name), f"theme {name}")
-        names = dict.fromkeys(each.name for world in self.screen.query(WorldMap) for each in world.place.prints)
+                yield Hit(
+                    score,
+                    Content(f"theme: {name}"),
+                    partial(setattr, self.app, "theme", name),
+                    f"theme {name}",
+                )
+        names = dict.fromkeys(
+            each.name for world in self.screen.query(WorldMap) for each in world.place.prints
+        )
         wanted = query.strip().casefold()
-        for name in islice((name for name in names if wanted and wanted in name.casefold()), MOST_MODELS):
+        for name in islice(
+            (name for name in names if wanted and wanted in name.casefold()), MOST_MODELS
+        ):
             words = f"go to {shortened(plain(name), LONGEST_NAME)} on the map"
             yield Hit(1.0, Content(words), partial(self._go_to, name), words)
 

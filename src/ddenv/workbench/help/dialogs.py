@@ -19,7 +19,9 @@ from ddenv.workbench.shared.bindings import keys
 class Reading(ModalScreen[None]):
     """A dialog with rows under titles: what stands there, in bold, and what it means."""
 
-    def __init__(self, title: str, groups: Iterable[tuple[str, Iterable[tuple[str | Text, str | Text]]]]) -> None:
+    def __init__(
+        self, title: str, groups: Iterable[tuple[str, Iterable[tuple[str | Text, str | Text]]]]
+    ) -> None:
         super().__init__()
         self._title = title
         self._groups = groups
@@ -34,7 +36,10 @@ class Reading(ModalScreen[None]):
             table.add_row("", Text(title, "bold underline"))
             for row in rows:
                 table.add_row(*row)
-        with Framed(self._title, "↑ ↓ scroll   escape closes", classes="dialog reading"), VerticalScroll():
+        with (
+            Framed(self._title, "↑ ↓ scroll   escape closes", classes="dialog reading"),
+            VerticalScroll(),
+        ):
             yield Static(table, markup=False)
 
 
@@ -43,7 +48,9 @@ class Pick(ModalScreen[int | None]):
 
     BINDINGS: ClassVar = keys("pick", ("close", "escape,q", "dismiss", "close", "choose nothing"))
 
-    def __init__(self, title: str, does: str, lines: Sequence[Text], *, head: Text | None = None, at: int = 0) -> None:
+    def __init__(
+        self, title: str, does: str, lines: Sequence[Text], *, head: Text | None = None, at: int = 0
+    ) -> None:
         super().__init__()
         self._title = title
         self._does = does
@@ -69,7 +76,9 @@ class Pick(ModalScreen[int | None]):
 class SideBySide(ModalScreen[None]):
     """`lines` have the name of a fact, and what it is in the first and in the second one."""
 
-    BINDINGS: ClassVar = keys("compare", ("close", "escape,c,q,enter", "dismiss", "close", "close this dialog"))
+    BINDINGS: ClassVar = keys(
+        "compare", ("close", "escape,c,q,enter", "dismiss", "close", "close this dialog")
+    )
 
     def __init__(self, title: str, lines: Iterable[tuple[str, str, str]]) -> None:
         super().__init__()
@@ -84,6 +93,8 @@ class SideBySide(ModalScreen[None]):
         for name, one, other in self._lines:
             style = "" if one == other else "bold"
             # Not by weight alone: some terminals and all screen readers drop it.
-            table.add_row(name if one == other else f"{name} ≠", Text(one, style), Text(other, style))
+            table.add_row(
+                name if one == other else f"{name} ≠", Text(one, style), Text(other, style)
+            )
         with Framed(self._title, "↑ ↓ scroll   escape closes"), VerticalScroll():
             yield Static(table, markup=False)

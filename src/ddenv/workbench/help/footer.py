@@ -90,7 +90,9 @@ class KeyFooter(Keys):
     def render(self) -> Content:
         parts: list[Content | str] = []
         for entry in self.entries:
-            drawn = Content.assemble((entry.shown, "bold $footer-key-foreground"), f" {entry.words}")
+            drawn = Content.assemble(
+                (entry.shown, "bold $footer-key-foreground"), f" {entry.words}"
+            )
             drawn = drawn if entry.enabled else drawn.stylize("dim")
             parts += [drawn.stylize(pressing(entry.key, "" if entry.enabled else "app.bell")), " "]
         return Content.assemble(*parts)

@@ -27,7 +27,9 @@ class Keys(Widget):
         """Presses a key here: a pane without the focus gets it first."""
         focused = self.screen.focused
         if focused is None or self not in focused.ancestors:
-            inside = next((node for node in self.screen.focus_chain if self in node.ancestors), None)
+            inside = next(
+                (node for node in self.screen.focus_chain if self in node.ancestors), None
+            )
             if inside is not None:
                 self.screen.set_focus(inside)
         # By the app itself: a key that this widget sends would not come further up than to it.
@@ -42,7 +44,9 @@ def pressing(key: str, action: str = "") -> Style:
 class Framed(Vertical, Keys):
     """`hints` are keys with what they do, three spaces apart: `enter opens   escape cancels`."""
 
-    def __init__(self, title: str | Text, hints: str = "", *, id: str | None = None, classes: str = "dialog") -> None:
+    def __init__(
+        self, title: str | Text, hints: str = "", *, id: str | None = None, classes: str = "dialog"
+    ) -> None:
         super().__init__(id=id, classes=classes)
         self.border_title = title
         self._hints = hints

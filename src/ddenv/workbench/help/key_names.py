@@ -21,7 +21,12 @@ _NAMED = {key.value for key in Keys}
 _SIGNS = {_named(sign): sign for sign in string.punctuation if sign != ","} | {"comma": ","}
 _ARROWS = {"up": "↑", "down": "↓", "left": "←", "right": "→"}
 # Terminals send the same code for both keys of a pair.
-_SAME = {"ctrl+i": "tab", "ctrl+m": "enter", "ctrl+h": "backspace", "ctrl+left_square_bracket": "escape"}
+_SAME = {
+    "ctrl+i": "tab",
+    "ctrl+m": "enter",
+    "ctrl+h": "backspace",
+    "ctrl+left_square_bracket": "escape",
+}
 
 
 def shown(keys: str) -> str:
@@ -66,5 +71,7 @@ def _textual_key(key: str, where: str) -> str:
         )
     found = "+".join((*sorted(modifiers, key=_MODIFIERS.index), name))
     if found in _SAME:
-        raise UserError(f"{where}: terminals send the same for {found} and {_SAME[found]}; use another key")
+        raise UserError(
+            f"{where}: terminals send the same for {found} and {_SAME[found]}; use another key"
+        )
     return found

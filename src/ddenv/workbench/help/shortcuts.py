@@ -76,11 +76,17 @@ def groups(screen: Screen[Any]) -> list[Group]:
     title = "Here"
     hints = ""
     if pane is not None:
-        titles = (str(each) for node in pane.ancestors_with_self if (each := getattr(node, "border_title", None)))
+        titles = (
+            str(each)
+            for node in pane.ancestors_with_self
+            if (each := getattr(node, "border_title", None))
+        )
         title = plain(next(titles, title))
         hints = (pane.HELP or "") if "HELP" in vars(type(pane)) else ""
     found = [
-        Group(title, _merged(panes), tuple(plain(line) for line in hints.splitlines() if line.strip())),
+        Group(
+            title, _merged(panes), tuple(plain(line) for line in hints.splitlines() if line.strip())
+        ),
         Group("This screen", _merged(own)),
         Group("Everywhere", _merged(everywhere)),
     ]
@@ -88,7 +94,9 @@ def groups(screen: Screen[Any]) -> list[Group]:
 
 
 def commands(screen: Screen[Any]) -> list[Shortcut]:
-    return [each for group in groups(screen) for each in group.shortcuts if each.id and each.enabled]
+    return [
+        each for group in groups(screen) for each in group.shortcuts if each.id and each.enabled
+    ]
 
 
 def _merged(found: Iterable[ActiveBinding]) -> tuple[Shortcut, ...]:
@@ -101,7 +109,16 @@ def _merged(found: Iterable[ActiveBinding]) -> tuple[Shortcut, ...]:
         binding = active.binding
         keys = shown(",".join(each.binding.key for each in (active, *more)))
         id = binding.id or ""
-        shortcuts.append(Shortcut(keys=keys, words=_words(active), action=binding.action, node=active.node, id=id, enabled=active.enabled))
+        shortcuts.append(
+            Shortcut(
+                keys=keys,
+                words=_words(active),
+                action=binding.action,
+                node=active.node,
+                id=id,
+                enabled=active.enabled,
+            )
+        )
     return tuple(shortcuts)
 
 
@@ -116,7 +133,8 @@ class Help(Reading):
     """Every key with what it does: those of the focused pane first."""
 
     BINDINGS: ClassVar = keys(
-        "help", ("close", "escape,question_mark,q,enter,f1", "dismiss", "close", "close this dialog")
+        "help",
+        ("close", "escape,question_mark,q,enter,f1", "dismiss", "close", "close this dialog"),
     )
 
     def __init__(self, groups: Iterable[Group]) -> None:

@@ -20,16 +20,32 @@ def signs() -> dict[str, Signs]:
     return {
         "On the map": (
             PARTS,
-            ("a b", "not in the candidate shown; with the layer participants: no effect on the run"),
+            (
+                "a b",
+                "not in the candidate shown; with the layer participants: no effect on the run",
+            ),
             *(sign for sign in MORE_SIGNS if sign not in (PARTS, NO_PART)),
             *LEGEND,
         ),
         "On the map of tests played back": (*OF_WAYS, ("a", "in only one of the two")),
-        "On the time of a test": (("●", "the instant shown"), ("┤", "its end"), ("▾", "touches a model"), OF_WAYS[-1]),
-        "On the chart": (("╌", "at least this many models seem to be needed"), ("▲", "you decided something")),
+        "On the time of a test": (
+            ("●", "the instant shown"),
+            ("┤", "its end"),
+            ("▾", "touches a model"),
+            OF_WAYS[-1],
+        ),
+        "On the chart": (
+            ("╌", "at least this many models seem to be needed"),
+            ("▲", "you decided something"),
+        ),
         "How a test ended": (*_split(OUTCOME), ("▶", "running")),
-        "Verdicts of candidates": (*_split(VERDICT), (DROPS, "it drops a model that rests on one that is gone")),
-        "Verdicts of a certificate": tuple((sign, " or ".join(words)) for sign, words in claims.items()),
+        "Verdicts of candidates": (
+            *_split(VERDICT),
+            (DROPS, "it drops a model that rests on one that is gone"),
+        ),
+        "Verdicts of a certificate": tuple(
+            (sign, " or ".join(words)) for sign, words in claims.items()
+        ),
         "What a certificate has shown": (
             ("≥", "what is left keeps at least this share of the rate of f"),
             ("≤", "without the model f shows at most this often, as a share of the rate with it"),
@@ -43,7 +59,10 @@ def signs() -> dict[str, Signs]:
             (branches.REJECTED, "taken back, or f is too rare in it"),
             (branches.OTHER, "another environment that the run reached"),
         ),
-        "In the status line": (("◂", "an earlier moment of the run is shown"), ("▼", "f is rarer than it should be")),
+        "In the status line": (
+            ("◂", "an earlier moment of the run is shown"),
+            ("▼", "f is rarer than it should be"),
+        ),
     }
 
 
@@ -54,7 +73,9 @@ def _split(words: dict[str, str]) -> Signs:
 class SignsDialog(Reading):
     """All signs with their meanings."""
 
-    BINDINGS: ClassVar = keys("signs", ("close", "escape,k,q,enter", "dismiss", "close", "close this dialog"))
+    BINDINGS: ClassVar = keys(
+        "signs", ("close", "escape,k,q,enter", "dismiss", "close", "close this dialog")
+    )
 
     def __init__(self) -> None:
         super().__init__("Signs", signs().items())

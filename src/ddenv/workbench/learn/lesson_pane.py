@@ -53,10 +53,17 @@ class LessonPane(VerticalScroll):
     def _choose(self, by: int) -> bool:
         """Moves the cursor from answer to answer, once all is in sight; False if no question is open."""
         page = self._page
-        if page is None or page.question is None or page.chosen is not None or self.scroll_y < self.max_scroll_y:
+        if (
+            page is None
+            or page.question is None
+            or page.chosen is not None
+            or self.scroll_y < self.max_scroll_y
+        ):
             return False
         last = len(page.question.answers) - 1
-        self.cursor = (0 if by > 0 else last) if self.cursor is None else max(0, min(self.cursor + by, last))
+        self.cursor = (
+            (0 if by > 0 else last) if self.cursor is None else max(0, min(self.cursor + by, last))
+        )
         self._draw(page)
         return True
 
@@ -79,7 +86,9 @@ class LessonPane(VerticalScroll):
         said = ""
         if self.scroll_y < self.max_scroll_y:
             said = "enter shows the rest"
-        elif self._page is not None and self._page.question is not None and self._page.chosen is None:
+        elif (
+            self._page is not None and self._page.question is not None and self._page.chosen is None
+        ):
             said = f"{letters(self._page.question)}, or ↑ ↓ and enter; s skips"
         self.parent.border_subtitle = said
 

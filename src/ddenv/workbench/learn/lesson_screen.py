@@ -54,8 +54,20 @@ class LessonScreen(LearnScreen[bool]):
         ("hint", "h", "hint", "hint", "show a hint for the question"),
         ("run_back", "left", "move('moment', -1)", "run back", "the run: one moment back"),
         ("run_on", "right", "move('moment', 1)", "run on", "the run: one moment on"),
-        ("next_decision", "right_parenthesis", "move('decision', 1)", "verdict", "the run: to the next verdict"),
-        ("decision_before", "left_parenthesis", "move('decision', -1)", "", "the run: to the verdict before"),
+        (
+            "next_decision",
+            "right_parenthesis",
+            "move('decision', 1)",
+            "verdict",
+            "the run: to the next verdict",
+        ),
+        (
+            "decision_before",
+            "left_parenthesis",
+            "move('decision', -1)",
+            "",
+            "the run: to the verdict before",
+        ),
         (
             "next_reduction",
             "right_curly_bracket",
@@ -63,11 +75,35 @@ class LessonScreen(LearnScreen[bool]):
             "reduction",
             "the run: to the next reduction",
         ),
-        ("reduction_before", "left_curly_bracket", "move('reduction', -1)", "", "the run: to the reduction before"),
-        ("activity", "t", "activity", "try", "search yourself, or watch the race, where a step has one"),
+        (
+            "reduction_before",
+            "left_curly_bracket",
+            "move('reduction', -1)",
+            "",
+            "the run: to the reduction before",
+        ),
+        (
+            "activity",
+            "t",
+            "activity",
+            "try",
+            "search yourself, or watch the race, where a step has one",
+        ),
         ("predict", "p", "predict", "predict", "predict what comes next in the run"),
-        ("again", "r", "again", "start again", "at the end of a lesson: start it again, with a new score"),
-        ("variables", "v", "variables", "variables", "the variables instead of the map (80 columns)"),
+        (
+            "again",
+            "r",
+            "again",
+            "start again",
+            "at the end of a lesson: start it again, with a new score",
+        ),
+        (
+            "variables",
+            "v",
+            "variables",
+            "variables",
+            "the variables instead of the map (80 columns)",
+        ),
         *(
             (letter, letter, f"answer({place})", letter, f"give answer {letter}")
             for place, letter in enumerate(LETTERS)
@@ -110,7 +146,9 @@ class LessonScreen(LearnScreen[bool]):
                 yield Happening(id="lesson-happening")
             with Framed("Variables now", id="lesson-variables-panel", classes="panel"):
                 yield Variables(id="lesson-variables")
-            with Framed("Lesson" if self._opened else "This run", id="lesson-panel", classes="panel"):
+            with Framed(
+                "Lesson" if self._opened else "This run", id="lesson-panel", classes="panel"
+            ):
                 yield LessonPane()
 
     def on_mount(self) -> None:
@@ -126,7 +164,11 @@ class LessonScreen(LearnScreen[bool]):
         page = self.course.page
         ended = self._opened is not None and course.step == course.last
         if ended:
-            following = f"\n\n`enter` opens the next lesson: **{self._following}**." if self._following else ""
+            following = (
+                f"\n\n`enter` opens the next lesson: **{self._following}**."
+                if self._following
+                else ""
+            )
             done = f"Done. `backspace` goes back through it, `r` starts it again.{following}"
             page = replace(page, after=blocks(done))
         self.query_one(LessonPane).show(page)
@@ -136,7 +178,9 @@ class LessonScreen(LearnScreen[bool]):
         asked = page.question if page.chosen is None else None
         # The pane *Algorithm* comes with the first step that speaks of it; where none does, it is shown from the start.
         steps = () if self._opened is None else self._opened.lesson.steps
-        plain = course.step < next((at for at, step in enumerate(steps) if "*Algorithm*" in step.text), 0)
+        plain = course.step < next(
+            (at for at, step in enumerate(steps) if "*Algorithm*" in step.text), 0
+        )
         self.set_class(plain, "-plain")
         can = {
             "lesson.activity": course.activity or "",
@@ -147,11 +191,27 @@ class LessonScreen(LearnScreen[bool]):
             "lesson.predict": "" if plain or course.must_answer else "predict",
         }
         # The keys of the run come with the algorithm.
-        of_run = {"run_back": "run back", "run_on": "run on", "next_decision": "verdict", "next_reduction": "reduction"}
-        can |= {f"lesson.{key}": "" if plain else words for key, words in (of_run | {"variables": "variables"}).items()}
+        of_run = {
+            "run_back": "run back",
+            "run_on": "run on",
+            "next_decision": "verdict",
+            "next_reduction": "reduction",
+        }
+        can |= {
+            f"lesson.{key}": "" if plain else words
+            for key, words in (of_run | {"variables": "variables"}).items()
+        }
         for id, words in can.items():
             footer.say(id, words)
-        on = f"{course.activity}" if due else "next lesson" if self._at_next else "" if ended else "go on"
+        on = (
+            f"{course.activity}"
+            if due
+            else "next lesson"
+            if self._at_next
+            else ""
+            if ended
+            else "go on"
+        )
         footer.say("lesson.on", "answer" if asked else on, letters(asked) if asked else "")
         self._keep_score()
 
@@ -178,9 +238,15 @@ class LessonScreen(LearnScreen[bool]):
         if test is not None:
             # With its path, as far as it is recorded, and the robot where it ended.
             pose = test.end_pose
-            live = () if pose is None or len(pose) < COLUMNS - 1 else (Live(slot=0, test=test.id, time=0.0, pose=pose),)
+            live = (
+                ()
+                if pose is None or len(pose) < COLUMNS - 1
+                else (Live(slot=0, test=test.id, time=0.0, pose=pose),)
+            )
             snapshot = replace(snapshot, evidence=self._moments.path(test.id), live=live)
-        self.query_one("#lesson-world").border_title = "World" if test is None else f"World: path of test {test.id}"
+        self.query_one("#lesson-world").border_title = (
+            "World" if test is None else f"World: path of test {test.id}"
+        )
         self.query_one(Happening).show(snapshot)
         self.query_one(Variables).show(variables(moment))
         self._map.show(snapshot, snapshot.pointed)
@@ -228,7 +294,9 @@ class LessonScreen(LearnScreen[bool]):
             self._moved()
         else:
             self.say(
-                "the lesson begins here" if self._opened else "no lesson is open: the left arrow goes back in the run"
+                "the lesson begins here"
+                if self._opened
+                else "no lesson is open: the left arrow goes back in the run"
             )
 
     def action_again(self) -> None:

@@ -30,7 +30,14 @@ class LessonsScreen(LearnScreen[None]):
     # It has room for what matters in any terminal.
     HORIZONTAL_BREAKPOINTS = VERTICAL_BREAKPOINTS = []
     BINDINGS: ClassVar = [
-        Binding("enter", "open", "open", id="lessons.open", tooltip="open the lesson where you left it", priority=True),
+        Binding(
+            "enter",
+            "open",
+            "open",
+            id="lessons.open",
+            tooltip="open the lesson where you left it",
+            priority=True,
+        ),
         *keys("lessons", HELP, ("back", "escape,q", "close", "back", "back, or leave", "esc")),
     ]
 
@@ -53,7 +60,11 @@ class LessonsScreen(LearnScreen[None]):
             except UserError as error:
                 self.notify(str(error), severity="warning", markup=False)
         scores = all_scores()
-        undone = (place for place, each in enumerate(self._lessons) if not scores.get(each.name, Score()).done)
+        undone = (
+            place
+            for place, each in enumerate(self._lessons)
+            if not scores.get(each.name, Score()).done
+        )
         self._fill(next(undone, 0))
         self.query_one(OptionList).focus()
         if self._opens is not None:
@@ -72,7 +83,9 @@ class LessonsScreen(LearnScreen[None]):
         scores = all_scores()
         at = (options.highlighted or 0) if at is None else at
         done = sum(scores.get(lesson.name, Score()).done for lesson in self._lessons)
-        heading = Text(" Lessons", "bold").append(f" · {done} of {len(self._lessons)} done", "not bold")
+        heading = Text(" Lessons", "bold").append(
+            f" · {done} of {len(self._lessons)} done", "not bold"
+        )
         self.query_one("#lessons-header", Static).update(heading)
         width = max(30, self.size.width - 40)
         options.clear_options()
@@ -96,11 +109,16 @@ class LessonsScreen(LearnScreen[None]):
     def _open(self, file: Path) -> None:
         from ddenv.workbench.learn.lesson_screen import LessonScreen
 
-        place = next((place for place, each in enumerate(self._lessons) if each.file == file), len(self._lessons))
+        place = next(
+            (place for place, each in enumerate(self._lessons) if each.file == file),
+            len(self._lessons),
+        )
         after = self._lessons[place + 1 : place + 2]
         try:
             opened = open_lesson(file)
-            screen = LessonScreen(opened.lesson.run, opened, "".join(plain(each.title) for each in after))
+            screen = LessonScreen(
+                opened.lesson.run, opened, "".join(plain(each.title) for each in after)
+            )
         except UserError as error:
             self.notify(str(error), severity="warning", markup=False)
             return

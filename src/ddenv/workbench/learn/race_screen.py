@@ -34,7 +34,12 @@ SAID = 6
 AROUND = 2
 LEGEND = "■ there  □ left out  · gone   ● f  ◇ other  ○ goal   ✓ done"
 # What the tests were good for; the rest is rare.
-COLUMNS = {"f showed": "f showed", "part without f": "part alone", "rest without f": "without a part", "again": "again"}
+COLUMNS = {
+    "f showed": "f showed",
+    "part without f": "part alone",
+    "rest without f": "without a part",
+    "again": "again",
+}
 LONGEST_NAME = 24
 
 
@@ -65,7 +70,9 @@ class RacerPane(Vertical):
         ended = done and play.ended
         figures = f" · {count(tests, 'test')}{', stopped' if stopped else ''} · {len(left)} left{' ✓' if ended else ''}"
         # As text: a name may look like markup.
-        self.border_title = Text(shortened(plain(play.name), max(6, room - 4 - len(figures))) + figures)
+        self.border_title = Text(
+            shortened(plain(play.name), max(6, room - 4 - len(figures))) + figures
+        )
         self.map.show(snapshot_of(self._base, left, turn), None if turn is None else turn.candidate)
         there = frozenset(left if turn is None else turn.candidate.models)
         signs = "".join(SIGNS.get(each.outcome, "?") for each in play.turns[:tests])
@@ -75,13 +82,19 @@ class RacerPane(Vertical):
             again = ", again" if turn.again else ""
             what = f"{candidate.label}{again}: {count(candidate.size, 'model')} {SIGNS.get(turn.outcome, '?')}"
         last = signs if len(signs) <= room else f"…{signs[-(room - 1) :]}"
-        self._said.update(Text(f"{truncated(what, room)}\n{_bar(play.begins, frozenset(left), there, room)}\n{last}"))
+        self._said.update(
+            Text(
+                f"{truncated(what, room)}\n{_bar(play.begins, frozenset(left), there, room)}\n{last}"
+            )
+        )
 
 
 def _bar(models: Names, left: frozenset[str], there: frozenset[str], room: int) -> str:
     """A cell for each model in the world's order; of more models than there is room, by their shares."""
     if len(models) <= room:
-        return "".join(GONE if name not in left else IN if name in there else OUT for name in models)
+        return "".join(
+            GONE if name not in left else IN if name in there else OUT for name in models
+        )
     kept = max(bool(left), round(room * len(left) / len(models)))
     tested = min(kept, max(bool(there & left), round(room * len(there & left) / len(models))))
     return IN * tested + OUT * (kept - tested) + GONE * (room - kept)
@@ -150,12 +163,18 @@ class RaceScreen(LearnScreen[None]):
         race = self.race
         for pane in self._panes:
             pane.show(race)
-        state = "over" if race.over else "runs: space pauses it" if self._runs_on else "space runs it"
-        header = Text(" Race", "bold", no_wrap=True, overflow="ellipsis").append(f" · {state}", "not bold")
+        state = (
+            "over" if race.over else "runs: space pauses it" if self._runs_on else "space runs it"
+        )
+        header = Text(" Race", "bold", no_wrap=True, overflow="ellipsis").append(
+            f" · {state}", "not bold"
+        )
         header.append(f" · test {race.at}" if race.at else "", "not bold")
         self.query_one("#race-header", Static).update(header)
         panel = self.query_one("#race-panel", VerticalScroll)
-        panel.border_title = "Who won, and why" if race.over else "Tests that showed f, and tests that did not"
+        panel.border_title = (
+            "Who won, and why" if race.over else "Tests that showed f, and tests that did not"
+        )
         panel.border_subtitle = LEGEND
         # A line for each search: its tests so far, those that showed f, and those that did not, by kind.
         width = min(LONGEST_NAME, max(len(play.name) for play in race.plays))

@@ -40,7 +40,13 @@ class TryScreen(LearnScreen[None]):
     BINDINGS: ClassVar = keys(
         "try",
         ("mark", "space", "mark", "mark", "mark or unmark the model under the crosshair"),
-        ("without", "w", "test(False)", "test without", "test what is kept without the marked models"),
+        (
+            "without",
+            "w",
+            "test(False)",
+            "test without",
+            "test what is kept without the marked models",
+        ),
         ("only", "o", "test(True)", "test only", "test the marked models alone"),
         ("back", "u", "back", "undo", "undo: restore what the last reduction removed"),
         ("done", "m", "done", "minimal", "claim that no single model can go: the verdict"),
@@ -51,7 +57,12 @@ class TryScreen(LearnScreen[None]):
     )
 
     def __init__(
-        self, run: Path, base: Snapshot, attempt: Attempt, plays: tuple[Play, ...], keep: Callable[[Attempt], None]
+        self,
+        run: Path,
+        base: Snapshot,
+        attempt: Attempt,
+        plays: tuple[Play, ...],
+        keep: Callable[[Attempt], None],
     ) -> None:
         super().__init__()
         self._run = run
@@ -80,15 +91,24 @@ class TryScreen(LearnScreen[None]):
         attempt = self.attempt
         self._map.show(snapshot_of(self._base, attempt.held), None)
         header = Text(" Do it yourself", "bold", no_wrap=True)
-        header.append(f" · {len(attempt.held)} of {count(len(attempt.oracle.models), 'model')} kept", "not bold")
-        header.append(f" · {attempt.tests_left} of {count(attempt.budget, 'test')} left", "not bold")
+        header.append(
+            f" · {len(attempt.held)} of {count(len(attempt.oracle.models), 'model')} kept",
+            "not bold",
+        )
+        header.append(
+            f" · {attempt.tests_left} of {count(attempt.budget, 'test')} left", "not bold"
+        )
         self.query_one("#try-header", Static).update(header)
         tests = self.query_one("#try-tests", VerticalScroll)
         table = self.query_one("#try-table", Static)
         if attempt.ended:
             tests.border_title = "Side by side"
             tests.border_subtitle = ""
-            table.update(_side_by_side(list(comparison(attempt.oracle, self._plays, attempt)), tests.size.width))
+            table.update(
+                _side_by_side(
+                    list(comparison(attempt.oracle, self._plays, attempt)), tests.size.width
+                )
+            )
         else:
             tests.border_title = "Your tests"
             tests.border_subtitle = "● f  ◇ other  ○ goal"
@@ -107,7 +127,10 @@ class TryScreen(LearnScreen[None]):
         if attempt.ended:
             verdict = Text(f"{'✓' if attempt.found else '✗'} {plain(attempt.verdict)}", "bold")
             said.update(
-                verdict.append(f"\n\n{plain(in_one_sentence(attempt.oracle, self._plays, attempt))}", "not bold")
+                verdict.append(
+                    f"\n\n{plain(in_one_sentence(attempt.oracle, self._plays, attempt))}",
+                    "not bold",
+                )
             )
             return
         first = "You keep the whole world, and it shows f. Which models does f need?"
@@ -121,7 +144,9 @@ class TryScreen(LearnScreen[None]):
         models = Text("Kept: ")
         for name in attempt.held:
             sign = "*" if name in marked else ""
-            word = Text(f"{sign}{shortened(plain(name), LONGEST_NAME)}", "bold reverse" if sign else "bold")
+            word = Text(
+                f"{sign}{shortened(plain(name), LONGEST_NAME)}", "bold reverse" if sign else "bold"
+            )
             word.apply_meta({"@click": f"screen.mark_one({attempt.oracle.models.index(name)})"})
             models.append_text(word).append("  ")
         left = len(attempt.held) - len(marked)
@@ -207,7 +232,9 @@ def _row(number: int, tried: Tried) -> Text:
     text.append(f"{SIGNS[tried.outcome]} ", "bold")
     # The shorter list says it best.
     shorter = len(tried.out) <= len(tried.kept)
-    words = f"without {_names(tried.out)}" if shorter else f"only {_names(tried.kept) or 'no model'}"
+    words = (
+        f"without {_names(tried.out)}" if shorter else f"only {_names(tried.kept) or 'no model'}"
+    )
     return text.append(words, "bold" if tried.outcome == "similar" else "")
 
 

@@ -26,7 +26,10 @@ DULL = 0.5
 ORIGINAL = 0.55
 PATH = 0.8
 # Background and text that a theme of the terminal's own colours may have: it does not say which these are.
-OWN: dict[bool, tuple[RGB, RGB]] = {True: ((15, 20, 27), (213, 219, 229)), False: ((246, 248, 251), (28, 35, 45))}
+OWN: dict[bool, tuple[RGB, RGB]] = {
+    True: ((15, 20, 27), (213, 219, 229)),
+    False: ((246, 248, 251), (28, 35, 45)),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +79,30 @@ def unpacked(color: int) -> RGB:
 
 
 def mixed(
-    ground: RGB, fore: RGB, *, own: bool = False, accent: RGB = YELLOW, marks: tuple[RGB, RGB, RGB] | None = None
+    ground: RGB,
+    fore: RGB,
+    *,
+    own: bool = False,
+    accent: RGB = YELLOW,
+    marks: tuple[RGB, RGB, RGB] | None = None,
 ) -> Palette:
     """For a background and a text colour; with `own` the background is the terminal's. `marks` are those of start, goal and f."""
     start, goal, failure = marks or ((31, 111, 235), (26, 127, 55), (207, 34, 46))
     # The accent is moved towards the text's colour if it is too near to the background's.
     moved = (packed(blend(accent, fore, part)) for part in (0.0, 0.25, 0.5))
-    live = next((each for each in moved if abs(luminance(each) - luminance(packed(ground))) > 90), packed(fore))
-    return Palette(back=PLAIN if own else packed(ground), ground=ground, fore=fore, live=live, start=packed(start), goal=packed(goal), failure=packed(failure))
+    live = next(
+        (each for each in moved if abs(luminance(each) - luminance(packed(ground))) > 90),
+        packed(fore),
+    )
+    return Palette(
+        back=PLAIN if own else packed(ground),
+        ground=ground,
+        fore=fore,
+        live=live,
+        start=packed(start),
+        goal=packed(goal),
+        failure=packed(failure),
+    )
 
 
 def palette_of(app: App[Any], back: Color, fore: Color) -> Palette:

@@ -17,7 +17,19 @@ from textual.strip import Strip
 from ddenv.map.cells import Cell, place_signs
 from ddenv.map.colors import readable
 from ddenv.map.paint import Canvas
-from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Spans, View, arrow, braille, fit, owners, pack, spans
+from ddenv.map.raster import (
+    ARROWS,
+    EMPTY,
+    HOLLOW,
+    Spans,
+    View,
+    arrow,
+    braille,
+    fit,
+    owners,
+    pack,
+    spans,
+)
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.store import COLUMNS
 from ddenv.text import plain, shortened
@@ -112,7 +124,9 @@ class MapDrawing:
             if trail[-1:] != [point]:
                 trail.append(point)
 
-    def frame(self, shown: Shown, view: View, palette: Palette, cursor: Cell | None) -> tuple[Canvas, Picture]:
+    def frame(
+        self, shown: Shown, view: View, palette: Palette, cursor: Cell | None
+    ) -> tuple[Canvas, Picture]:
         """A new frame, and its picture without robots and crosshair. Without a `cursor` it has no crosshair."""
         shown = self._with_live(shown)
         still = self._still(shown, view, palette)
@@ -148,7 +162,11 @@ class MapDrawing:
     def _still(self, shown: Shown, view: View, palette: Palette) -> Picture:
         """The last one again if only the crosshair or the focus moved."""
         of = shown, view, palette
-        if self._picture is None or self._of is None or any(a is not b for a, b in zip(of, self._of, strict=True)):
+        if (
+            self._picture is None
+            or self._of is None
+            or any(a is not b for a, b in zip(of, self._of, strict=True))
+        ):
             self._of = of
             self._picture = _still(*of)
         return self._picture
@@ -158,19 +176,29 @@ class MapDrawing:
         live = None
         if not shown.ways and shown.snapshot.live:
             ids = _in_focus(shown.snapshot)
-            live = next((each for each in shown.snapshot.live if each.test in ids), shown.snapshot.live[0])
+            live = next(
+                (each for each in shown.snapshot.live if each.test in ids), shown.snapshot.live[0]
+            )
         if (live is None or not live.models) and self._moved is None:
             return shown
         if self._moved is None or self._moved.place is not shown.place:
             self._moved = MovedPrints(shown.place)
-        poses = {} if live is None else {name: pose_of(values) for name, values in live.models.items()}
+        poses = (
+            {} if live is None else {name: pose_of(values) for name, values in live.models.items()}
+        )
         prints = self._moved.at(poses)
-        return shown if prints is shown.place.prints else replace(shown, place=replace(shown.place, prints=prints))
+        return (
+            shown
+            if prints is shown.place.prints
+            else replace(shown, place=replace(shown.place, prints=prints))
+        )
 
 
 def _in_focus(snapshot: Snapshot) -> frozenset[int]:
     focus = snapshot.focus
-    return frozenset(test.id for test in snapshot.running if focus is not None and test.candidate == focus.index)
+    return frozenset(
+        test.id for test in snapshot.running if focus is not None and test.candidate == focus.index
+    )
 
 
 def _still(shown: Shown, view: View, palette: Palette) -> Picture:
@@ -187,7 +215,11 @@ def _still(shown: Shown, view: View, palette: Palette) -> Picture:
         canvas.dots(braille(points, view, dash), color)
     # Letters with their own backgrounds, so that they are easy to find.
     failure = shown.failure if "failure" in shown.layers else None
-    places = [(shown.start, "S", palette.start), (shown.place.goal, "G", palette.goal), (failure, "×", palette.failure)]
+    places = [
+        (shown.start, "S", palette.start),
+        (shown.place.goal, "G", palette.goal),
+        (failure, "×", palette.failure),
+    ]
     marks: dict[Cell, tuple[str, int]] = {}
     for point, sign, ground in (*places, (shown.parting, PARTING, palette.live)):
         if point and np.isfinite(point).all() and (cell := view.cell(*point)) is not None:
@@ -201,7 +233,16 @@ def _still(shown: Shown, view: View, palette: Palette) -> Picture:
     for cell, (sign, ground) in marks.items():
         canvas.put(cell, sign, readable(ground), ground)
         written[cell] = True
-    still = Picture(view=view, how=how, canvas=canvas, grid=grid, gone=gone, dotted=dotted, written=written, cells=cells)
+    still = Picture(
+        view=view,
+        how=how,
+        canvas=canvas,
+        grid=grid,
+        gone=gone,
+        dotted=dotted,
+        written=written,
+        cells=cells,
+    )
     if "names" in shown.layers:
         _names(still, shown.place.prints, shown.failure or shown.start)
     return still
@@ -229,14 +270,18 @@ def _names(drawn: Picture, prints: Sequence[Footprint], near: Point | None) -> N
 
 def _room(drawn: Picture, at: tuple[int, int], text: str, sign: int) -> tuple[int, int, str] | None:
     """The row and column for a name beside a sign of so many cells, or on the model without one; None where there is no room."""
-    begins = ((0, sign + 1), (0, -len(text) - 1), (-1, 0), (1, 0)) if sign else ((0, 0), (-1, 0), (1, 0))
+    begins = (
+        ((0, sign + 1), (0, -len(text) - 1), (-1, 0), (1, 0)) if sign else ((0, 0), (-1, 0), (1, 0))
+    )
     for down, right in begins:
         row = at[0] + down
         column = at[1] + right
         if not (0 <= row < drawn.view.rows and 0 <= column <= drawn.view.columns - len(text)):
             continue
         # With a free cell on each side names stay apart.
-        if not drawn.written[row, max(0, column - (right != sign + 1)) : column + len(text) + 1].any():
+        if not drawn.written[
+            row, max(0, column - (right != sign + 1)) : column + len(text) + 1
+        ].any():
             return row, column, text
     return None
 
@@ -247,7 +292,9 @@ def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:
     signs = {"f": palette.failure, "goal": palette.goal}
     limits = [(ring, signs.get(verdict, palette.shade(DULL)), 0) for verdict, ring in shown.limits]
     if shown.ways or limits:
-        both = zip(shown.ways, (palette.shade(PATH), palette.shade(ORIGINAL)), (0, DASH), strict=False)
+        both = zip(
+            shown.ways, (palette.shade(PATH), palette.shade(ORIGINAL)), (0, DASH), strict=False
+        )
         return [*limits, *[(way.points, color, dash) for way, color, dash in both][::-1]]
     lines = [(_path(snapshot.evidence), palette.shade(PATH), 0)] if "path" in layers else []
     if "original" in layers and not shown.same_paths:
@@ -257,7 +304,11 @@ def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:
 
 def _path(rows: array[float] | None) -> np.ndarray:
     """Flat rows of a motion as (N, 2) m."""
-    return np.zeros((0, 2)) if rows is None else np.array(rows, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
+    return (
+        np.zeros((0, 2))
+        if rows is None
+        else np.array(rows, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
+    )
 
 
 def _crosshair(canvas: Canvas, cell: Cell, written: np.ndarray, palette: Palette) -> None:
@@ -279,5 +330,7 @@ def strip(canvas: Canvas, row: int) -> Strip:
 
 @lru_cache(maxsize=4096)
 def _style(fore: int, back: int, bold: bool) -> Style:
-    fore_color, back_color = (Color.default() if each < 0 else Color.from_rgb(*unpacked(each)) for each in (fore, back))
+    fore_color, back_color = (
+        Color.default() if each < 0 else Color.from_rgb(*unpacked(each)) for each in (fore, back)
+    )
     return Style(color=fore_color, bgcolor=back_color, bold=bold)

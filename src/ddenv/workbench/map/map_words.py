@@ -74,7 +74,9 @@ def legend(shown: Shown, width: int, lines: int = 2) -> Text:
     used = 0
     gap = GAP if width >= WITH_GAPS else 1
     if shown.ways or shown.limits:
-        ways = ((sign, way.name) for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False))
+        ways = (
+            (sign, way.name) for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False)
+        )
         rare = (LIMITS if shown.limits else None, PARTED if shown.parting else None, shown.apart)
         usual = (*ways, *filter(None, rare), *(each for each in LEGEND if each[0] in "SG×·#"))
     for sign, meaning in usual:
@@ -113,7 +115,9 @@ def describe(state: RunState, each: Footprint, columns: int = 0) -> Text:
     for number, (name, moment) in enumerate(_sensed(state), start=1):
         if name == each.name:
             words.append(f"sensed at {moment:.1f} s (no. {number})")
-    text = Text(shortened(each.name, min(LONGEST_NAME, columns or LONGEST_NAME)), "bold", no_wrap=True)
+    text = Text(
+        shortened(each.name, min(LONGEST_NAME, columns or LONGEST_NAME)), "bold", no_wrap=True
+    )
     text.append("".join(f" · {word}" for word in words if word), "not bold")
     text.truncate(columns or text.cell_len, overflow="ellipsis")
     return text
@@ -158,7 +162,9 @@ class MapLines(Widget):
             text.append(": p pin, w try without, o try only", "dim")
         elif shown.candidate is not None:
             drop = dropping(drops(state, shown.candidate), longest)
-            text.append(f"{shown.candidate.label}: {drop or count(shown.candidate.size, 'model')}", "bold")
+            text.append(
+                f"{shown.candidate.label}: {drop or count(shown.candidate.size, 'model')}", "bold"
+            )
             text.append("" if drop else "  others in small letters", "dim")
         else:
             return legend(shown, width)

@@ -109,13 +109,21 @@ def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
     found, tones = np.unique(kinds * (len(HUES) + 1) + short + 1, return_inverse=True)
     mixes = [divmod(value, len(HUES) + 1) for value in found.tolist()]
     alike = tuple(palette.tone(kind, part - 1) for kind, part in mixes)
-    return Looks(kinds=kinds, tones=tones.astype(np.int32), looks=alike, palette=palette, signs=_signs(names, kinds, parts, who))
+    return Looks(
+        kinds=kinds,
+        tones=tones.astype(np.int32),
+        looks=alike,
+        palette=palette,
+        signs=_signs(names, kinds, parts, who),
+    )
 
 
 @lru_cache(maxsize=4)
 def _known(prints: tuple[Footprint, ...]) -> tuple[Names, np.ndarray]:
     areas = np.array([each.area for each in prints])
-    large = areas > max(FLOOR_AREA, FLOOR_FACTOR * float(np.median(areas))) if len(areas) else areas > 0
+    large = (
+        areas > max(FLOOR_AREA, FLOOR_FACTOR * float(np.median(areas))) if len(areas) else areas > 0
+    )
     hollow = np.array([each.hollow for each in prints], dtype=bool)
     return tuple(each.name for each in prints), large & ~hollow
 
@@ -135,7 +143,9 @@ def _signs(names: Names, kinds: np.ndarray, parts: np.ndarray, who: Kept) -> Sig
     if who.sensed:
         order = [who.sensed.get(name, 0) for name in names]
         rank = np.where(np.array(order) > 0, order, math.inf)
-        texts = [f"{text}{number}" if number else text for text, number in zip(texts, order, strict=True)]
+        texts = [
+            f"{text}{number}" if number else text for text, number in zip(texts, order, strict=True)
+        ]
     falling = _among(names, who.dropped)
     for number in np.flatnonzero(falling).tolist():
         texts[number] = f"{DROPS}{texts[number]}"
@@ -160,7 +170,9 @@ def fill(canvas: Canvas, grid: np.ndarray, how: Looks) -> None:
     tone = np.append(how.tones, len(how.looks))
     fills = np.array([*(each.fill for each in how.looks), ground], dtype=np.int32)
     inks = np.array([*(each.ink for each in how.looks), ground], dtype=np.int32)
-    glyphs = np.array([ord(char) for char in (*(each.glyph for each in how.looks), " ")], dtype=np.uint32)
+    glyphs = np.array(
+        [ord(char) for char in (*(each.glyph for each in how.looks), " ")], dtype=np.uint32
+    )
     upper = tone[grid[0::2]]
     lower = tone[grid[1::2]]
     whole = upper == lower
@@ -202,7 +214,9 @@ def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> No
         canvas.chars[where & protected] = ord(line)
 
 
-def ghosts(canvas: Canvas, removed: np.ndarray, grid: np.ndarray, how: Looks, color: int) -> np.ndarray:
+def ghosts(
+    canvas: Canvas, removed: np.ndarray, grid: np.ndarray, how: Looks, color: int
+) -> np.ndarray:
     """Dots at removed models: `removed` is their owner grid. Of the kept models they hide only floors.
 
     Returns which cells have dots, shape (rows, columns).

@@ -110,7 +110,11 @@ class MovedPrints:
     def __init__(self, place: Place) -> None:
         self.place = place
         self._prints = place.prints
-        self._numbers = {each.name: number for number, each in enumerate(place.prints) if each.name in place.movable}
+        self._numbers = {
+            each.name: number
+            for number, each in enumerate(place.prints)
+            if each.name in place.movable
+        }
         self._poses: dict[str, Pose] = {}
 
     def at(self, poses: Mapping[str, Pose]) -> tuple[Footprint, ...]:
@@ -122,15 +126,20 @@ class MovedPrints:
 
         known = {name: pose for name, pose in poses.items() if name in self._numbers}
         changed = {
-            self._numbers[name]: self.place.prints[self._numbers[name]] for name in set(self._poses) - set(known)
+            self._numbers[name]: self.place.prints[self._numbers[name]]
+            for name in set(self._poses) - set(known)
         }
         for name, pose in known.items():
             if pose != self._poses.get(name):
                 model = self.place.movable[name]
-                changed[self._numbers[name]] = footprint(model, moved=pose @ model.links[0].pose.inverse())
+                changed[self._numbers[name]] = footprint(
+                    model, moved=pose @ model.links[0].pose.inverse()
+                )
         self._poses = known
         if changed:
-            self._prints = tuple(changed.get(number, each) for number, each in enumerate(self._prints))
+            self._prints = tuple(
+                changed.get(number, each) for number, each in enumerate(self._prints)
+            )
         return self._prints
 
 
@@ -140,7 +149,9 @@ def place_of(world: World, scenario: Scenario | None = None) -> Place:
 
     protected = frozenset(scenario.protected) if scenario else frozenset()
     movable = {model.name: model for model in world.models if not model.static}
-    place = Place(prints=footprints(world), elements=frozenset(world.elements(protected)), movable=movable)
+    place = Place(
+        prints=footprints(world), elements=frozenset(world.elements(protected)), movable=movable
+    )
     if scenario is None:
         return place
     spawn = scenario.robot.spawn

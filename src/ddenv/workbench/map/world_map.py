@@ -153,13 +153,19 @@ class WorldMap(Widget, can_focus=True):
             self.draw()
 
     def show_ways(
-        self, ways: tuple[Way, ...], parting: Point | None, apart: tuple[str, str] | None, prints: tuple[Footprint, ...]
+        self,
+        ways: tuple[Way, ...],
+        parting: Point | None,
+        apart: tuple[str, str] | None,
+        prints: tuple[Footprint, ...],
     ) -> None:
         """Shows finished tests in place of the run's own paths (see `Shown`), and the models at `prints`."""
         known = [way.points for way in self.shown.ways]
         place = self.place if prints is self.place.prints else replace(self.place, prints=prints)
         self.shown = replace(self.shown, place=place, ways=ways, parting=parting, apart=apart)
-        same = len(known) == len(ways) and all(way.points is old for way, old in zip(ways, known, strict=True))
+        same = len(known) == len(ways) and all(
+            way.points is old for way, old in zip(ways, known, strict=True)
+        )
         self.draw() if same or not self.viewport.fitted else self._refit()
 
     def show_limits(self, limits: Limits) -> None:
@@ -182,7 +188,11 @@ class WorldMap(Widget, can_focus=True):
 
     def describe(self, name: str, columns: int = 0) -> Text:
         number = self._numbers.get(name)
-        return Text() if number is None else describe(self.snapshot.state, self.place.prints[number], columns)
+        return (
+            Text()
+            if number is None
+            else describe(self.snapshot.state, self.place.prints[number], columns)
+        )
 
     def go_to(self, name: str) -> bool:
         number = self._numbers.get(name)
@@ -241,7 +251,9 @@ class WorldMap(Widget, can_focus=True):
         state = self.snapshot.state
         port = self.viewport
         if self.picking and port.view is not None:
-            self.post_message(self.PlacePicked(*(round(value, 3) for value in port.view.point(port.cursor))))
+            self.post_message(
+                self.PlacePicked(*(round(value, 3) for value in port.view.point(port.cursor)))
+            )
         elif name is None or not state.elements or self.shown.ways:
             return
         elif name in state.environment:
@@ -261,7 +273,9 @@ class WorldMap(Widget, can_focus=True):
     def _refit(self) -> None:
         columns, rows = self.size
         if columns and rows and self._has_world:
-            self.viewport.resize(columns, rows, lambda *size: self._drawing.fitting(self.shown, *size))
+            self.viewport.resize(
+                columns, rows, lambda *size: self._drawing.fitting(self.shown, *size)
+            )
             self.draw()
 
     @property
@@ -407,7 +421,11 @@ class Viewport:
     def resize(self, columns: int, rows: int, fitting: Callable[[int, int], View]) -> None:
         """Changes the size or the important places: `fitting` returns a view of these for a size."""
         view = self.view
-        new = fitting(columns, rows) if view is None or self.fitted else replace(view, columns=columns, rows=rows)
+        new = (
+            fitting(columns, rows)
+            if view is None or self.fitted
+            else replace(view, columns=columns, rows=rows)
+        )
         # Drawings are reused for a view, so an equal view stays the same object.
         if new == view:
             return
@@ -440,7 +458,11 @@ class Viewport:
             self.pan(right, up)
 
     def holds(self, cell: Cell) -> bool:
-        return self.view is not None and 0 <= cell[0] < self.view.rows and 0 <= cell[1] < self.view.columns
+        return (
+            self.view is not None
+            and 0 <= cell[0] < self.view.rows
+            and 0 <= cell[1] < self.view.columns
+        )
 
     def center_on(self, x: float, y: float) -> None:
         if self.view is not None:

@@ -51,7 +51,11 @@ class Met(Widget):
 
     def put(self, tests: tuple[Test, ...], lacks: Names) -> None:
         signs = ROBOTS if len(tests) > 1 else ("",)
-        lines = ((at, sign, words) for sign, test in zip(signs, tests, strict=False) for at, words in met(test))
+        lines = (
+            (at, sign, words)
+            for sign, test in zip(signs, tests, strict=False)
+            for at, words in met(test)
+        )
         self._lines = sorted(lines, key=itemgetter(0))
         self._lacks = lacks
         self._now = 0

@@ -96,7 +96,10 @@ def now() -> float:
     return time.monotonic()
 
 
-FIRST = ids("playback", "help close play beside frame_back frame_on parting slower faster swap before next back on")
+FIRST = ids(
+    "playback",
+    "help close play beside frame_back frame_on parting slower faster swap before next back on",
+)
 
 
 class Playback(Screen[None]):
@@ -113,14 +116,40 @@ class Playback(Screen[None]):
         ("play", "space", "play", "play", "play, or pause; at the end: from the start"),
         ("back", "left", f"step({-STEP})", "1 s back", "one second back"),
         ("on", "right", f"step({STEP})", "1 s on", "one second on"),
-        ("frame_back", "comma", "frame(-1)", "frame back", f"one frame ({FRAME:g} s) back, and pause", ","),
-        ("frame_on", "full_stop", "frame(1)", "frame on", f"one frame ({FRAME:g} s) on, and pause", "."),
+        (
+            "frame_back",
+            "comma",
+            "frame(-1)",
+            "frame back",
+            f"one frame ({FRAME:g} s) back, and pause",
+            ",",
+        ),
+        (
+            "frame_on",
+            "full_stop",
+            "frame(1)",
+            "frame on",
+            f"one frame ({FRAME:g} s) on, and pause",
+            ".",
+        ),
         ("slower", "less_than_sign", "speed(-1)", "slower", "slower", "<"),
         ("faster", "greater_than_sign", "speed(1)", "faster", "faster", ">"),
         ("start", "home", "go(0)", "start", "to the start of the test"),
         ("end", "end", "go(1)", "end", "to the end of the test"),
-        ("parting", "p", "parting", "paths diverge", "to the instant at which the paths of the two tests diverge"),
-        ("beside", "o", "beside", "two tests", "play another test over this one, or this one alone again"),
+        (
+            "parting",
+            "p",
+            "parting",
+            "paths diverge",
+            "to the instant at which the paths of the two tests diverge",
+        ),
+        (
+            "beside",
+            "o",
+            "beside",
+            "two tests",
+            "play another test over this one, or this one alone again",
+        ),
         ("swap", "x", "swap", "swap", "the second test becomes the first one: its models move"),
         ("before", "up", "test(-1)", "test before", "the finished test before this one"),
         ("next", "down", "test(1)", "next test", "the next finished test"),
@@ -131,7 +160,13 @@ class Playback(Screen[None]):
     )
 
     def __init__(
-        self, file: RunFile, position: Position, place: Place, test: int, beside: int | None = None, limits: Limits = ()
+        self,
+        file: RunFile,
+        position: Position,
+        place: Place,
+        test: int,
+        beside: int | None = None,
+        limits: Limits = (),
     ) -> None:
         """Raises UserError if a test is not finished."""
         super().__init__()
@@ -161,7 +196,9 @@ class Playback(Screen[None]):
         yield Static(f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
 
     def on_mount(self) -> None:
-        self.query_one(Timeline).tooltip = "click or drag: go to that instant; wheel: frame by frame"
+        self.query_one(
+            Timeline
+        ).tooltip = "click or drag: go to that instant; wheel: frame by frame"
         self.set_interval(PERIOD, self._tick)
         self._put()
         if self._place.prints:
@@ -180,7 +217,9 @@ class Playback(Screen[None]):
         tests = tuple(played(self._file, self._position, number) for number in numbers)
         self._tests = tests
         self._parting = None
-        self._ways = tuple(way_of(one, called(one) if len(tests) == 2 else "its way") for one in tests)
+        self._ways = tuple(
+            way_of(one, called(one) if len(tests) == 2 else "its way") for one in tests
+        )
         self._prints = MovedPrints(self._place)
         if len(tests) == 2 and all(one.rows for one in tests):
             _, at, place = parted(tests[0].rows, tests[1].rows)
@@ -212,13 +251,16 @@ class Playback(Screen[None]):
         # Links at joints are no models.
         moved = len(first.moving.keys() & self._place.movable.keys())
         moves = f"{count(moved, 'model')} that moved" if moved else "no model moved"
-        self.query_one("#playback-world").border_title = Text(f"World · {moves}" if first.rows else "World")
+        self.query_one("#playback-world").border_title = Text(
+            f"World · {moves}" if first.rows else "World"
+        )
         lines = [f"{called(one)}: {plain(one.words)}, seed {one.test.seed}" for one in self._tests]
         if len(lines) == 2:
             lines = [f"{sign} {line}" for sign, line in zip(ROBOTS, lines, strict=True)]
         titles = (" Playback", "         ")
         header = Text("\n", no_wrap=True, overflow="ellipsis").join(
-            Text.assemble((title, "bold"), f" · {line}") for title, line in zip(titles, lines, strict=False)
+            Text.assemble((title, "bold"), f" · {line}")
+            for title, line in zip(titles, lines, strict=False)
         )
         self.query_one("#playback-header", Static).update(header)
         self._show()
@@ -250,7 +292,9 @@ class Playback(Screen[None]):
         ends = [way.robot[:2] for way in ways if way.robot is not None]
         if len(ends) == 2:
             words += f" · {math.dist(*ends):.2f} m apart"
-        self.query_one("#playback-time").border_title = Text(words if playing.length else "no path is stored")
+        self.query_one("#playback-time").border_title = Text(
+            words if playing.length else "no path is stored"
+        )
         self.query_one(MapLines).show(self.map.shown)
 
     def _go(self, time: float) -> None:
@@ -292,7 +336,9 @@ class Playback(Screen[None]):
 
         def line(number: str, words: str, seed: str, end: str) -> Text:
             what = padded(shortened(words, WORDS), WORDS)
-            return Text(f"{number:>{NUMBER}}  {what}{seed:>{SEED}}  {shortened(end, OUTCOME)}", no_wrap=True)
+            return Text(
+                f"{number:>{NUMBER}}  {what}{seed:>{SEED}}  {shortened(end, OUTCOME)}", no_wrap=True
+            )
 
         def chosen(row: int | None) -> None:
             if row is not None:
@@ -304,7 +350,9 @@ class Playback(Screen[None]):
             lines.append(line(str(test.id), purpose(state, test), seed, outcome(test)))
         head = line("test", "of", "seed", "end")
         at = min(1, len(tests))
-        self.app.push_screen(Pick(f"Play beside test {first.id}", "plays both", lines, head=head, at=at), chosen)
+        self.app.push_screen(
+            Pick(f"Play beside test {first.id}", "plays both", lines, head=head, at=at), chosen
+        )
 
     def action_swap(self) -> None:
         if len(self._tests) == 2:
@@ -320,7 +368,12 @@ class Playback(Screen[None]):
         if 0 < number <= len(tests):
             self._change([number])
         else:
-            refuse(self, "there is no finished test after this one" if by > 0 else "there is no test before this one")
+            refuse(
+                self,
+                "there is no finished test after this one"
+                if by > 0
+                else "there is no test before this one",
+            )
 
 
 def called(one: Played) -> str:
@@ -342,7 +395,16 @@ def way_of(one: Played, name: str) -> Way:
 
 def snapshot_with(state: RunState, there: Names, groups: tuple[Names, ...]) -> Snapshot:
     """The run as if these models were its environment, and these `groups` the parts of its round, each with a letter."""
-    round = Round(number=0, n_partitions=len(groups), split=Split(environment=there, partitions=groups), candidates=PersistentTuple()) if groups else None
+    round = (
+        Round(
+            number=0,
+            n_partitions=len(groups),
+            split=Split(environment=there, partitions=groups),
+            candidates=PersistentTuple(),
+        )
+        if groups
+        else None
+    )
     bare = state.changed(environment=there, round=round, trials=(), pinned=frozenset(), supports=())
     return Snapshot(state=bare, past=True)
 

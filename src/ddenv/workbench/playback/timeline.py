@@ -29,7 +29,9 @@ class Timeline(Widget):
     ALLOW_SELECT = False
     DEFAULT_CSS = "Timeline { height: auto; }"
 
-    def __init__(self, go: Callable[[float], None], turn: Callable[[int], None], *, id: str) -> None:
+    def __init__(
+        self, go: Callable[[float], None], turn: Callable[[int], None], *, id: str
+    ) -> None:
         """`go` is called with the simulated time, s, that the user wants to see, `turn` with so many frames."""
         super().__init__(id=id)
         self._go = go
@@ -56,7 +58,11 @@ class Timeline(Widget):
 
     @property
     def _words(self) -> int:
-        return min(WORDS, max((len(outcome(one.test)) for one in self._tests), default=0), self.size.width // 3)
+        return min(
+            WORDS,
+            max((len(outcome(one.test)) for one in self._tests), default=0),
+            self.size.width // 3,
+        )
 
     @property
     def _room(self) -> int:
@@ -69,7 +75,9 @@ class Timeline(Widget):
     def _line(self, robot: str, one: Played) -> Text:
         last = self._cell(one.length)
         now = self._cell(self._time)
-        cells = [GONE if cell < now else COMING for cell in range(last + 1)] + [" "] * (self._room - 1 - last)
+        cells = [GONE if cell < now else COMING for cell in range(last + 1)] + [" "] * (
+            self._room - 1 - last
+        )
         for _, at in one.test.first_touched:
             if at <= one.length:
                 cells[self._cell(at)] = TOUCH

@@ -41,7 +41,9 @@ UNTRUSTED = "not done: it starts a program that you do not trust"
 class Asking:
     """Sends commands for `screen`, and knows which of them the engine has not obeyed yet."""
 
-    def __init__(self, screen: Screen[Any], poll: Poll, engine: Engine, changed: Callable[[], None]) -> None:
+    def __init__(
+        self, screen: Screen[Any], poll: Poll, engine: Engine, changed: Callable[[], None]
+    ) -> None:
         """`changed` is called when the command that waits for its answer changes."""
         self._screen = screen
         self._poll = poll
@@ -66,7 +68,9 @@ class Asking:
     def situation(self) -> Situation:
         snapshot = self._poll.snapshot
         last = self._last[1]
-        pending = last.words(snapshot.state).brief if last is not None and self.waiting_for() else ""
+        pending = (
+            last.words(snapshot.state).brief if last is not None and self.waiting_for() else ""
+        )
         return Situation(snapshot.state, snapshot.engine, self.barred, pending)
 
     @property
@@ -184,7 +188,11 @@ class Asking:
     def go_on(self) -> None:
         """Starts an engine for the last command if none is running, or if the last one ended without reading it."""
         snapshot = self._poll.snapshot
-        if self._due > snapshot.state.last_command and snapshot.engine == "absent" and not snapshot.error:
+        if (
+            self._due > snapshot.state.last_command
+            and snapshot.engine == "absent"
+            and not snapshot.error
+        ):
             self._due = 0
             self._once_trusted(self._start)
 
@@ -199,7 +207,10 @@ class Asking:
             self._screen.notify(str(error), severity="error", markup=False)
         else:
             once_trusted(
-                self._screen.app, scenario, self._poll.path, lambda yes: then() if yes else self.refuse(UNTRUSTED)
+                self._screen.app,
+                scenario,
+                self._poll.path,
+                lambda yes: then() if yes else self.refuse(UNTRUSTED),
             )
 
     def _start(self, **options: int) -> None:

@@ -17,7 +17,17 @@ from ddenv.runfile.supports import drops
 from ddenv.text import count, percent, percent_at_least, plain, told_apart
 from ddenv.words.claims import made_of_usual, short
 from ddenv.words.early_stop import early_among
-from ddenv.words.signs import CLAIM, DROPS, VERDICT, brief, dropping, metres, outcome, signs, simulated
+from ddenv.words.signs import (
+    CLAIM,
+    DROPS,
+    VERDICT,
+    brief,
+    dropping,
+    metres,
+    outcome,
+    signs,
+    simulated,
+)
 from ddenv.words.slices import implied_words
 
 # Maximum widths of a model's name as a verdict and as a row, in cells.
@@ -98,7 +108,11 @@ def round_title(state: RunState) -> tuple[str, str]:
         number = f" {certificate.number}" if certificate.number > 1 else ""
         rows = fresh_runs(state)
         aim = percent_at_least(certificate.certify_rate)
-        keeps = f"keeps {rows[0].shows_at_least}, aim {aim}" if rows[0].shows_at_least else f"has to show {aim}"
+        keeps = (
+            f"keeps {rows[0].shows_at_least}, aim {aim}"
+            if rows[0].shows_at_least
+            else f"has to show {aim}"
+        )
         keeps = "chosen seeds" if certificate.seeds else keeps
         made = sum(one.runs for one in rows)
         far = made_of_usual(state, certificate) if in_the_making(state) else count(made, "run")

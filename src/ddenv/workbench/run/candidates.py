@@ -45,7 +45,9 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         ("choose", "enter", "move(0)", "", "stay on this candidate"),
     )
 
-    def __init__(self, chosen: Callable[[], object] = lambda: None, *, id: str | None = None) -> None:
+    def __init__(
+        self, chosen: Callable[[], object] = lambda: None, *, id: str | None = None
+    ) -> None:
         """`chosen` is called when the cursor was moved by hand, or given back to the run: a message would be a frame later."""
         super().__init__(id=id)
         self._chosen = chosen
@@ -134,7 +136,9 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def _reveal(self) -> None:
         if self.size.height and not self._in_sight:
             above = self.cursor_row < self.scroll_offset.y
-            self.scroll_to(y=self.cursor_row - (0 if above else self._page - 1), animate=False, force=True)
+            self.scroll_to(
+                y=self.cursor_row - (0 if above else self._page - 1), animate=False, force=True
+            )
 
     def on_resize(self) -> None:
         self._arrange()
@@ -154,14 +158,22 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         if not cells:
             return Strip.blank(self.size.width, self.rich_style)
         is_cursor = row == self.cursor_row
-        style = self.get_component_rich_style("candidates--cursor") if is_cursor else self.rich_style
+        style = (
+            self.get_component_rich_style("candidates--cursor") if is_cursor else self.rich_style
+        )
         return self._strip(cells, style)
 
     def _strip(self, cells: Words, style: Style) -> Strip:
         *others, last = self.columns
         row = "".join(_aligned(column, cells.get(column.name, "")) for column in others)
         words = cells.get(last.name, "")
-        emphasis = STRONG if words.startswith(("●", "▶", "?")) else WEAK if words.startswith(("○", "⊘")) else Style()
+        emphasis = (
+            STRONG
+            if words.startswith(("●", "▶", "?"))
+            else WEAK
+            if words.startswith(("○", "⊘"))
+            else Style()
+        )
         segments = [Segment(row, style), Segment(_aligned(last, f"  {words}"), style + emphasis)]
         return Strip(segments).adjust_cell_length(self.size.width, style)
 
@@ -172,4 +184,6 @@ def _aligned(column: Column, text: str) -> str:
         return " " * (column.width - cell_len(text)) + text
     before = "" if column.name in ("#", "environment", "verdict") else " "
     room = column.width - len(before)
-    return before + (set_cell_size(text, room) if cell_len(text) <= room else f"{set_cell_size(text, room - 1)}…")
+    return before + (
+        set_cell_size(text, room) if cell_len(text) <= room else f"{set_cell_size(text, room - 1)}…"
+    )

@@ -35,7 +35,9 @@ class Change(ModalScreen[commands.Change | None]):
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (34, "-tall")]
     BINDINGS: ClassVar = [
         *keys("change", ("cancel", "escape", "dismiss(None)", "cancel", "change nothing")),
-        *keys("change", ("apply", "ctrl+s", "apply", "change", "change the settings"), priority=True),
+        *keys(
+            "change", ("apply", "ctrl+s", "apply", "change", "change the settings"), priority=True
+        ),
     ]
 
     def __init__(self, state: RunState) -> None:
@@ -60,7 +62,11 @@ class Change(ModalScreen[commands.Change | None]):
                         yield Static(one.label, classes="label", markup=False)
                         now = "" if (value := getattr(options, one.name)) is None else str(value)
                         choices = [(Text(name), name) for name in one.choices]
-                        yield _select(one.name, choices, now) if one.choices else Entry(now, id=one.name)
+                        yield (
+                            _select(one.name, choices, now)
+                            if one.choices
+                            else Entry(now, id=one.name)
+                        )
                     empty = "; empty: no limit" if one.none else ""
                     yield Static(f"{one.summary}{empty}", classes="meaning", markup=False)
             yield Static("", id="wrong", classes="wrong", markup=False)

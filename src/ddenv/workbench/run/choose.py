@@ -61,7 +61,11 @@ class ChooseModels(ModalScreen[Names | None]):
         self._part: str | None = None
 
     def compose(self) -> ComposeResult:
-        keys = "space tick   enter take   escape cancel" if self._several else "enter take it   escape cancel"
+        keys = (
+            "space tick   enter take   escape cancel"
+            if self._several
+            else "enter take it   escape cancel"
+        )
         with Framed("Models" if self._several else "Model", keys):
             yield Static(self._title, id="purpose", markup=False)
             yield Input(placeholder="part of a name", id="filter", compact=True)
@@ -104,7 +108,9 @@ class ChooseModels(ModalScreen[Names | None]):
 
     def _prompt(self, name: str) -> Text:
         mark = ("[x] " if name in self._chosen else "[ ] ") if self._several else ""
-        return Text(f"{mark}{'+ ' if name in self._pinned else ''}{shortened(name, WIDTH)}", no_wrap=True)
+        return Text(
+            f"{mark}{'+ ' if name in self._pinned else ''}{shortened(name, WIDTH)}", no_wrap=True
+        )
 
     def action_move(self, by: int) -> None:
         self._filter()
@@ -116,7 +122,9 @@ class ChooseModels(ModalScreen[Names | None]):
         place = self.query_one(OptionList).highlighted
         if self._several and place is not None:
             self._chosen ^= {self._found[place]}
-            self.query_one(OptionList).replace_option_prompt_at_index(place, self._prompt(self._found[place]))
+            self.query_one(OptionList).replace_option_prompt_at_index(
+                place, self._prompt(self._found[place])
+            )
             self._show_found()
 
     @on(OptionList.OptionHighlighted)
@@ -161,7 +169,9 @@ class Layers(ModalScreen[None]):
 
     def compose(self) -> ComposeResult:
         with Framed("What the map shows", "space or click shows or hides   escape closes"):
-            yield OptionList(*(Option(self._prompt(name)) for name in LAYERS), compact=True, markup=False)
+            yield OptionList(
+                *(Option(self._prompt(name)) for name in LAYERS), compact=True, markup=False
+            )
 
     def _prompt(self, name: str) -> Text:
         mark = "[x]" if name in self._world.shown.layers else "[ ]"

@@ -28,7 +28,9 @@ from ddenv.workbench.widgets.question import Choice
 class Method(Reading):
     """Algorithm, partitioning and prioritization of a run, each with its explanation."""
 
-    BINDINGS: ClassVar = keys("method", ("close", "escape,e,q,enter", "dismiss", "close", "close this dialog"))
+    BINDINGS: ClassVar = keys(
+        "method", ("close", "escape,e,q,enter", "dismiss", "close", "close this dialog")
+    )
 
     def __init__(self, algorithm: str, pair: str) -> None:
         groups = []
@@ -66,8 +68,15 @@ class ReductionWaits(Choice):
     )
 
     def __init__(self, text: str) -> None:
-        answers = {"accept": "Accept it", "reject": "Reject it", "drop": "Drop it", "cancel": "Cancel"}
-        super().__init__("A reduction waits", "a accept   x reject   d drop   c cancel", text, **answers)
+        answers = {
+            "accept": "Accept it",
+            "reject": "Reject it",
+            "drop": "Drop it",
+            "cancel": "Cancel",
+        }
+        super().__init__(
+            "A reduction waits", "a accept   x reject   d drop   c cancel", text, **answers
+        )
 
 
 class SceneDialog(ModalScreen[None]):
@@ -76,7 +85,13 @@ class SceneDialog(ModalScreen[None]):
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = keys(
         "scene",
-        ("copy", "c", "copy('address')", "copy the address", "copy the address to the clipboard (OSC 52)"),
+        (
+            "copy",
+            "c",
+            "copy('address')",
+            "copy the address",
+            "copy the address to the clipboard (OSC 52)",
+        ),
         ("ssh", "s", "copy('ssh line')", "copy the ssh line", "copy the ssh line to the clipboard"),
         ("stop", "x", "stop", "stop the scene", "end the scene's process"),
         ("close", "escape,m,enter", "dismiss", "close", "close; the scene stays on"),
@@ -107,7 +122,9 @@ class SceneDialog(ModalScreen[None]):
     def action_copy(self, what: str) -> None:
         if url := self._scene.url:
             self.app.copy_to_clipboard(url if what == "address" else ssh_line(url))
-        said = f"{what} copied, if the terminal allows it" if url else "the scene has no address yet"
+        said = (
+            f"{what} copied, if the terminal allows it" if url else "the scene has no address yet"
+        )
         self.query_one(Framed).say(said)
 
     def action_stop(self) -> None:
@@ -125,7 +142,10 @@ def failures(found: Sequence[OtherFailure]) -> Pick:
     def line(failure: str, tests: str, smallest: str) -> Text:
         return Text(f"{failure:<36}{tests:>7}   {smallest}", no_wrap=True)
 
-    lines = [line(one.name, str(len(one.tests)), f"{count(one.size, 'model')} (test {one.smallest})") for one in found]
+    lines = [
+        line(one.name, str(len(one.tests)), f"{count(one.size, 'model')} (test {one.smallest})")
+        for one in found
+    ]
     head = line("failure", "tests", "smallest environment")
     return Pick("Other failures met", "reduces it in a branch", lines, head=head)
 
@@ -141,6 +161,8 @@ def rounds(chapters: Sequence[Chapter], at: int | None) -> Pick:
         left = f"{'○' if one.left == one.models else '●'} {one.left}" if one.kind == "round" else ""
         name = "baseline" if one.kind == "baseline" else f"{one.kind} {one.number}"
         lines.append(line(name, str(one.models), left, count(one.tests, "test")))
-    start = next((row for row, each in enumerate(chapters) if at and at <= each.last), len(chapters) - 1)
+    start = next(
+        (row for row, each in enumerate(chapters) if at and at <= each.last), len(chapters) - 1
+    )
     head = line("", "models", "left", "after")
     return Pick("Rounds so far", "goes to its end", lines, head=head, at=start)

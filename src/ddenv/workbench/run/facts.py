@@ -48,7 +48,11 @@ def facts(position: Position, number: int, command: str) -> tuple[str, Text] | N
     if test.implied_by is not None:
         took = f"not simulated: no model that it lacks can have affected test {test.implied_by}, which implies it"
     elif test.is_finished:
-        computed = "its result was copied from another run" if test.taken else f"{test.wall_seconds:.1f} s of computing"
+        computed = (
+            "its result was copied from another run"
+            if test.taken
+            else f"{test.wall_seconds:.1f} s of computing"
+        )
         took = f"{test.simulated_seconds:.1f} s simulated, {computed}"
     said = {
         "end": how_it_ended(test),
@@ -79,16 +83,24 @@ def _counts(position: Position, state: RunState, test: Test) -> str:
     """What the test counts in, with the verdict on that."""
     if test.trial is not None and 0 < test.trial <= len(state.trials):
         trial = state.trials[test.trial - 1]
-        return f"{trial.label}: {trial.verdict or 'not judged yet'}, {count(len(trial.tests), 'test')}"
+        return (
+            f"{trial.label}: {trial.verdict or 'not judged yet'}, {count(len(trial.tests), 'test')}"
+        )
     if test.round is None or test.candidate is None:
         return ""
-    ends = (each.last for each in reversed(position.chapters) if each.kind == "round" and each.number == test.round)
+    ends = (
+        each.last
+        for each in reversed(position.chapters)
+        if each.kind == "round" and each.number == test.round
+    )
     round = position.state(next(ends, 0)).round
     if round is None or not 0 <= test.candidate < len(round.candidates):
         return ""
     one = round.candidates[test.candidate]
     numbers = ", ".join(map(str, one.tests[:NAMED]))
-    return f"{one.label} of round {round.number}: {one.verdict or 'not judged yet'}, tests {numbers}"
+    return (
+        f"{one.label} of round {round.number}: {one.verdict or 'not judged yet'}, tests {numbers}"
+    )
 
 
 class FactsDialog(ModalScreen[None]):

@@ -70,7 +70,11 @@ class Happening(Widget):
         first = min(max(self._first, index + beside + 1 - shown), index - beside)
         self._first = max(0, min(first, len(lines) - shown))
         for number, code in lines[self._first : self._first + shown]:
-            mark, style = ("▶", f"bold {self.app.theme_variables['primary']}") if number == current else (" ", "dim")
+            mark, style = (
+                ("▶", f"bold {self.app.theme_variables['primary']}")
+                if number == current
+                else (" ", "dim")
+            )
             row = Text(f"{mark}{number:>2} {code}", style, no_wrap=True)
             row.truncate(width, overflow="ellipsis")
             text.append_text(row).append("\n")

@@ -56,7 +56,14 @@ class ModelsLeft(Vertical):
 
     def show(self, state: RunState, prints: Sequence[Footprint]) -> None:
         split = None if state.round is None or state.round.done else state.round.split
-        made_of = (state.environment, split, state.pinned, state.evidence_test, state.baseline, prints)
+        made_of = (
+            state.environment,
+            split,
+            state.pinned,
+            state.evidence_test,
+            state.baseline,
+            prints,
+        )
         lines = self.query_one("#models", Lines)
         if made_of == self._made_of or not (width := lines.size.width):
             return
@@ -64,7 +71,9 @@ class ModelsLeft(Vertical):
         heading = f"{'model':<{max(4, width - REST)}}{'in':>3}{'from f':>9}{'sensed':>9}"
         self.query_one("#models-heading", Static).update(heading)
         parts = {} if split is None else split.letter_of
-        self._parts = {name: partition_letter(part) for name, part in parts.items()} | dict.fromkeys(state.pinned, "+")
+        self._parts = {
+            name: partition_letter(part) for name, part in parts.items()
+        } | dict.fromkeys(state.pinned, "+")
         self._prints = {each.name: each for each in prints}
         self._sensed = {} if state.evidence is None else dict(state.evidence.first_sensed)
         self._f = None if state.f_position is None else state.f_position[:2]
@@ -84,7 +93,11 @@ class ModelsLeft(Vertical):
         away = "" if stands is None or self._f is None else f"{stands.distance(self._f):.1f} m"
         sensed = f"{self._sensed[name]:.1f} s" if name in self._sensed else "never"
         text = Text(padded(shortened(name, room), room), no_wrap=True)
-        return text.append(f"{self._parts.get(name, ''):>3}", "bold").append(f"{away:>9}").append(f"{sensed:>9}", "dim")
+        return (
+            text.append(f"{self._parts.get(name, ''):>3}", "bold")
+            .append(f"{away:>9}")
+            .append(f"{sensed:>9}", "dim")
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +133,9 @@ class Chart(Widget):
         return steps(self._course, *self.size, (top, below, ink(colors, "text-warning", bold=True)))
 
 
-def steps(course: Course, width: int, height: int, styles: tuple[Style, Style, Style] = (Style(),) * 3) -> Text:
+def steps(
+    course: Course, width: int, height: int, styles: tuple[Style, Style, Style] = (Style(),) * 3
+) -> Text:
     """The chart as text of `height` lines; the last one is the axis of tests.
 
     The styles are those of the tops of the steps, of what is below, and of the line of needed models.
@@ -142,7 +157,9 @@ def steps(course: Course, width: int, height: int, styles: tuple[Style, Style, S
         place = max(0, bisect_right(points, at, key=lambda point: point.tests) - 1)
         needed = max(points[place].needed, course.needed if place == len(points) - 1 else 0)
         left.append(points[place].models)
-        levels.append(min(rows - 1, rows - 1 - int((needed / most) * rows - 1e-9)) if needed else rows)
+        levels.append(
+            min(rows - 1, rows - 1 - int((needed / most) * rows - 1e-9)) if needed else rows
+        )
     marks = {0: str(most), rows - 1: "0"}
     middle = rows // 2
     if rows >= 5 and (words := str(round(most * (1 - middle / rows)))) not in marks.values():
@@ -154,7 +171,9 @@ def steps(course: Course, width: int, height: int, styles: tuple[Style, Style, S
         text.append(f"{marks.get(row, ''):>{margin - 1}}{'┤' if row in marks else '│'}", "dim")
         cells = []
         for models, level in zip(left, levels, strict=True):
-            eighths = max(1 if models else 0, round(models / most * rows * 8)) - 8 * (rows - 1 - row)
+            eighths = max(1 if models else 0, round(models / most * rows * 8)) - 8 * (
+                rows - 1 - row
+            )
             char = LEVELS[min(8, max(0, eighths))]
             full = eighths > 8
             # Where steps and line meet in one row, the steps are drawn.

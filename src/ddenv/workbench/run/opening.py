@@ -68,11 +68,16 @@ class Opening:
             self._screen.action_pane("map")
         pinned = self._poll.snapshot.state.pinned
         mark = self._screen.world.mark
-        self._open(ChooseModels(title, names, several=several, mark=mark, pinned=pinned, chosen=chosen), then)
+        self._open(
+            ChooseModels(title, names, several=several, mark=mark, pinned=pinned, chosen=chosen),
+            then,
+        )
 
     def find(self) -> None:
         names = [each.name for each in self._screen.world.place.prints]
-        self.choose("Find a model on the map", names, False, lambda chosen: self._screen.find(chosen[0]))
+        self.choose(
+            "Find a model on the map", names, False, lambda chosen: self._screen.find(chosen[0])
+        )
 
     def change(self) -> None:
         self._open(Change(self._poll.snapshot.state), self._asking.ask)
@@ -81,14 +86,20 @@ class Opening:
         from ddenv.workbench.history import History
 
         # It asks the question itself.
-        self._open(History(lambda: self._asking.situation), lambda node: self._asking.ask(GoBack(node), sure=True))
+        self._open(
+            History(lambda: self._asking.situation),
+            lambda node: self._asking.ask(GoBack(node), sure=True),
+        )
 
     def failures(self) -> None:
         found = atlas(self._poll.snapshot.state)[:LISTED]
         if not found:
             self._asking.refuse("no test shows a failure other than f")
             return
-        self._open(failures(found), lambda row: self._asking.ask(AcceptOther(found[row].smallest, instead=True)))
+        self._open(
+            failures(found),
+            lambda row: self._asking.ask(AcceptOther(found[row].smallest, instead=True)),
+        )
 
     def rounds(self) -> None:
         position = self._screen.browsing.position
@@ -101,7 +112,9 @@ class Opening:
         if test is None:
             self._asking.refuse("there are no tests yet")
         else:
-            self._screen.app.push_screen(FactsDialog(position, test, attach_name(self._poll.path), self.play_test))
+            self._screen.app.push_screen(
+                FactsDialog(position, test, attach_name(self._poll.path), self.play_test)
+            )
 
     def play(self) -> None:
         self.play_row(self._screen.table.item)
@@ -134,10 +147,14 @@ class Opening:
 
         position = self._screen.browsing.position
         place = self._screen.world.place
-        self._screen.app.push_screen(WhyScreen(self._poll.file, position, place, engine, self._asking.ask))
+        self._screen.app.push_screen(
+            WhyScreen(self._poll.file, position, place, engine, self._asking.ask)
+        )
 
     def layers(self) -> None:
-        self._screen.app.push_screen(Layers(self._screen.world), lambda _: self._screen.show_legend())
+        self._screen.app.push_screen(
+            Layers(self._screen.world), lambda _: self._screen.show_legend()
+        )
 
     def copy(self) -> None:
         path = self._poll.path
@@ -145,7 +162,10 @@ class Opening:
         texts = [("names of the models left", "\n".join(self._poll.snapshot.state.environment))]
         if selected := self._screen.pointed.models:
             texts.append(("names selected", "\n".join(selected)))
-        texts += [("to come back", f"ddenv open {name}"), ("to go on without a screen", f"ddenv resume {name}")]
+        texts += [
+            ("to come back", f"ddenv open {name}"),
+            ("to go on without a screen", f"ddenv resume {name}"),
+        ]
         texts += [("where the run file is", str(path))]
 
         def chosen(row: int) -> None:
@@ -217,7 +237,11 @@ class Opening:
         self._screen.app.push_screen(dialog)
 
     def detach(self) -> None:
-        works = "The engine goes on" if self._poll.snapshot.engine != "absent" else "No engine is running"
+        works = (
+            "The engine goes on"
+            if self._poll.snapshot.engine != "absent"
+            else "No engine is running"
+        )
         again = f"{attach_name(self._poll.path)}{' --watch' if self._poll.watch else ''}"
         self._exit(f"{works}. Attach again with: ddenv open {again}")
 
@@ -229,7 +253,9 @@ class Opening:
                 self.detach()
             elif answer == "stop":
                 resume = f"ddenv resume {attach_name(self._poll.path)}"
-                self._asking.send(Stop(), then=lambda: self._exit(f"The engine stops. Go on later with: {resume}"))
+                self._asking.send(
+                    Stop(), then=lambda: self._exit(f"The engine stops. Go on later with: {resume}")
+                )
 
         if snapshot.engine == "absent" or snapshot.gone:
             self._screen.app.exit(0)
@@ -242,7 +268,9 @@ class Opening:
         self._screen.app.exit(0, message=Text(words))
 
 
-def of_row(state: RunState, item: Item | None, *, finished: bool = False) -> tuple[int | None, int | None]:
+def of_row(
+    state: RunState, item: Item | None, *, finished: bool = False
+) -> tuple[int | None, int | None]:
     """The test that tells most of a row, by its number, and one to compare it with: both None without tests.
 
     The last test of the row that showed f, else its last one, else the last one of all. Of the runs without a model: the first one

@@ -33,7 +33,16 @@ from ddenv.workbench.run.candidate_rows import round_title
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.models import Chart, ModelsLeft
-from ddenv.workbench.run.run_keys import BROWSING, ENDED, FIRST, GUIDING, KEYS, LOOKING, ON_MAP, TITLES
+from ddenv.workbench.run.run_keys import (
+    BROWSING,
+    ENDED,
+    FIRST,
+    GUIDING,
+    KEYS,
+    LOOKING,
+    ON_MAP,
+    TITLES,
+)
 from ddenv.workbench.run.snapshot import NOT_NOW, Browsing
 from ddenv.workbench.run.status import Header, Status, title, worth_a_look
 from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_lines
@@ -65,14 +74,21 @@ class RunScreen(Screen[None]):
     """Attached to one run. Leaving it never touches the engine, unless the user asks to stop it."""
 
     CSS_PATH = "run.tcss"
-    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (WIDE, "-wide"), (HUGE, "-huge")]
+    HORIZONTAL_BREAKPOINTS = [
+        (0, "-thin"),
+        (SMALLEST[0], "-narrow"),
+        (WIDE, "-wide"),
+        (HUGE, "-huge"),
+    ]
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low"), (23, "-short"), (30, "-tall")]
     BINDINGS: ClassVar = KEYS
     AUTO_FOCUS = "#candidates"
     # What the focus changes is drawn again by the widgets themselves: the whole screen need not be.
     focused: Reactive[Widget | None] = Reactive(None, repaint=False)
 
-    def __init__(self, run: Path, engine: Engine | None = None, watch: bool = False, classes: str = "") -> None:
+    def __init__(
+        self, run: Path, engine: Engine | None = None, watch: bool = False, classes: str = ""
+    ) -> None:
         """`engine` is the one that was just started on this run. With `watch` nothing is ever sent. `classes` fit the size.
 
         Raises UserError for a file that is no run file.
@@ -82,7 +98,9 @@ class RunScreen(Screen[None]):
         self.engine = engine or Engine(run)
         self.scene = Scene(run)
         self._log = Log()
-        self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, on_event=self._note)
+        self.poll = Poll(
+            run, starting=lambda: self.engine.starting, watch=watch, on_event=self._note
+        )
         self.browsing = Browsing(self.poll)
         self.table = Candidates(self._row_chosen, id="candidates")
         self.world = WorldMap(id="map")
@@ -110,7 +128,10 @@ class RunScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         yield Header(id="header")
-        yield Panes({name: f"{key} {words}" for key, (name, words) in enumerate(PANES.items(), 1)}, id="run-panes")
+        yield Panes(
+            {name: f"{key} {words}" for key, (name, words) in enumerate(PANES.items(), 1)},
+            id="run-panes",
+        )
         with Horizontal(id="run-body"):
             with Vertical(id="run-main"):
                 with Horizontal(id="top"):
@@ -123,13 +144,25 @@ class RunScreen(Screen[None]):
                     with _panel("left", "Models left by test"):
                         yield Chart(id="chart")
                     with _panel("log-panel", "Log"):
-                        yield Lines(as_it_is, nothing="nothing happened yet", tail=True, parts=Log.parts, id="log")
+                        yield Lines(
+                            as_it_is,
+                            nothing="nothing happened yet",
+                            tail=True,
+                            parts=Log.parts,
+                            id="log",
+                        )
                     with _panel("now", "What is happening", "e explains the method"):
                         yield Happening(id="happening")
             with Vertical(id="run-more"):
                 yield ModelsLeft(self.find, id="models-panel")
                 with _panel("decisions-panel", "What you decided"):
-                    yield Lines(as_it_is, nothing=NOTHING_DECIDED, tail=True, parts=decision_lines, id="decisions")
+                    yield Lines(
+                        as_it_is,
+                        nothing=NOTHING_DECIDED,
+                        tail=True,
+                        parts=decision_lines,
+                        id="decisions",
+                    )
         if self.poll.watch:
             yield Static(WATCHING, id="watching", markup=False)
         yield Status(id="status")
@@ -198,7 +231,13 @@ class RunScreen(Screen[None]):
         round, index, until = self._stays
         now = (state.node, state.round.number) if state.round and not state.round.done else None
         waits = state.waiting_candidate is not None
-        if state.round and now == round and moment < until and not waits and snapshot.engine == "alive":
+        if (
+            state.round
+            and now == round
+            and moment < until
+            and not waits
+            and snapshot.engine == "alive"
+        ):
             return state.round.candidates[index]
         if focus is not None and (now, focus.index) != (round, index):
             self._stays = now, focus.index, moment + CALM
@@ -269,8 +308,14 @@ class RunScreen(Screen[None]):
         names = self.world.selection
         if not names and self.world.has_focus and (name := self.world.model_at_cursor) is not None:
             names = frozenset((name,))
-        known = tuple(name for name in self.poll.snapshot.state.elements if name in names) if names else ()
-        row = self.table.under_cursor if self.table.is_attached and self.table.is_on_screen else None
+        known = (
+            tuple(name for name in self.poll.snapshot.state.elements if name in names)
+            if names
+            else ()
+        )
+        row = (
+            self.table.under_cursor if self.table.is_attached and self.table.is_on_screen else None
+        )
         return Pointed(row, self.table.following, (*known, *sorted(names.difference(known))))
 
     def _offer(self, name: str) -> Offer:
@@ -297,14 +342,24 @@ class RunScreen(Screen[None]):
 
             def chosen(models: Names) -> None:
                 now = offer(name, self.asking.situation, Pointed(models=models))
-                self.asking.refuse(now.why_not) if now.command is None else self.asking.ask(now.command)
+                self.asking.refuse(now.why_not) if now.command is None else self.asking.ask(
+                    now.command
+                )
 
-            self.opening.choose(TITLES[name], self.poll.snapshot.state.environment, True, chosen, self.pointed.models)
+            self.opening.choose(
+                TITLES[name],
+                self.poll.snapshot.state.environment,
+                True,
+                chosen,
+                self.pointed.models,
+            )
 
     def on_key(self, event: events.Key) -> None:
         """Says why a key does nothing."""
         # To list what all keys do now takes longer than most keys take.
-        if any(each in GUIDING.values() for each in self._bindings.key_to_bindings.get(event.key, ())):
+        if any(
+            each in GUIDING.values() for each in self._bindings.key_to_bindings.get(event.key, ())
+        ):
             active = self.active_bindings.get(event.key)
             if active is not None and not active.enabled and active.node is self:
                 name = next(name for name, each in GUIDING.items() if each.id == active.binding.id)
@@ -318,7 +373,9 @@ class RunScreen(Screen[None]):
         pointed = self.pointed
         for name, binding in GUIDING.items():
             offered = offer(name, now, pointed)
-            self._footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)
+            self._footer.say(
+                binding.id or "", "" if offered.why_not else offered.words or binding.description
+            )
 
     def _keys_here(self) -> Names:
         if self.browsing.is_past:

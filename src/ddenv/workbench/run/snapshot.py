@@ -48,7 +48,10 @@ class Browsing:
             from ddenv.words.news import happened
 
             moment = self.position.moment(at)
-            self._shown = at, Snapshot() if moment is None else self._moments.of(moment, happened(moment))
+            self._shown = (
+                at,
+                Snapshot() if moment is None else self._moments.of(moment, happened(moment)),
+            )
         return self._shown[1]
 
 

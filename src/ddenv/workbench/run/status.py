@@ -22,7 +22,20 @@ from ddenv.workbench.terminal.themes import ink
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
 # What is shortened or left out until the rest fits, the least important first.
 SHRINK = (
-    *("cut", "time", "left", "engine", "scene", "tests", "drift", "left", "mode", "drift", "left", "tests"),
+    *(
+        "cut",
+        "time",
+        "left",
+        "engine",
+        "scene",
+        "tests",
+        "drift",
+        "left",
+        "mode",
+        "drift",
+        "left",
+        "tests",
+    ),
     *("asked", "engine", "tests", "drift", "state"),
 )
 # Which states end with a notification: the first one of these that follows another state.
@@ -55,7 +68,9 @@ class Header(Widget):
         right = next((each for each in rights if shortest + len(each) + 2 <= room), rights[-1])
         room = max(0, room - len(right) - 2)
         left = next((each for each in lefts if len(each) <= room), truncated(lefts[-1], room))
-        text = Text(" ", no_wrap=True).append("ddenv", ink(self.app.theme_variables, "primary", bold=True))
+        text = Text(" ", no_wrap=True).append(
+            "ddenv", ink(self.app.theme_variables, "primary", bold=True)
+        )
         return text.append(f"  {left:<{room}}  ", "bold").append(right)
 
 
@@ -68,7 +83,13 @@ class Status(Widget):
         self._snapshot: Snapshot | None = None
         self._besides: tuple[str, str, tuple[int, int] | None] = ("", "", None)
 
-    def show(self, snapshot: Snapshot, scene: str = "", asked: str = "", place: tuple[int, int] | None = None) -> None:
+    def show(
+        self,
+        snapshot: Snapshot,
+        scene: str = "",
+        asked: str = "",
+        place: tuple[int, int] | None = None,
+    ) -> None:
         """`scene` is the URL of the 3-D scene while it is on, `asked` the command that waits for its answer.
 
         At an earlier moment of the run, `place` is its number, and the number of moments.
@@ -78,7 +99,11 @@ class Status(Widget):
             return
         self._snapshot = snapshot
         self._besides = (scene, asked, place)
-        now = facts(snapshot, scene, asked) if place is None else facts_of_past(snapshot, scene, *place)
+        now = (
+            facts(snapshot, scene, asked)
+            if place is None
+            else facts_of_past(snapshot, scene, *place)
+        )
         if now != self._facts:
             self._facts = now
             self.refresh()
@@ -91,7 +116,12 @@ class Status(Widget):
 
     def _style(self, name: str) -> Style:
         if name == "state":
-            colors = {"waiting": "text-warning", "lost": "text-error", "failed": "text-error", "paused": "text-warning"}
+            colors = {
+                "waiting": "text-warning",
+                "lost": "text-error",
+                "failed": "text-error",
+                "paused": "text-warning",
+            }
             status = self._snapshot.status if self._snapshot else ""
             variable = "text-warning" if self._besides[2] else colors.get(status, "text-success")
             return ink(self.app.theme_variables, variable, bold=True)
@@ -116,7 +146,12 @@ def heading(state: RunState) -> tuple[Sentences, Sentences]:
     if state.round is not None:
         n = "" if options.algorithm in GROUPS else f" · n {state.round.n_partitions}"
         step = [f"round {state.round.number}{n}"]
-    rights = ([*branch, *step, size, *pinned, *more], [*branch, *step, size, *pinned], [*branch, size], [size])
+    rights = (
+        [*branch, *step, size, *pinned, *more],
+        [*branch, *step, size, *pinned],
+        [*branch, size],
+        [size],
+    )
     # Without branches and pins there is only one form.
     return lefts, tuple(" · ".join(words) for words in (rights if branch or pinned else rights[:1]))
 
@@ -131,7 +166,10 @@ def branch_of(state: RunState) -> int | None:
         return None
     above = {node.parent for node in nodes if not node.rejected}
     leaves = [node.number for node in nodes if node.number not in above and not node.rejected]
-    return next((place for place, leaf in enumerate(leaves, start=1) if state.here in path(nodes, leaf)), None)
+    return next(
+        (place for place, leaf in enumerate(leaves, start=1) if state.here in path(nodes, leaf)),
+        None,
+    )
 
 
 def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:
@@ -188,10 +226,18 @@ def fitted(said: Facts, width: int) -> list[tuple[str, str]]:
 def tests_said(state: RunState) -> Sentences:
     counts = state.outcomes()
     total = state.tests_done
-    said = count(total, "test") if state.budget is None else f"{state.made} of {count(state.budget, 'test')}"
+    said = (
+        count(total, "test")
+        if state.budget is None
+        else f"{state.made} of {count(state.budget, 'test')}"
+    )
     said += f", {state.implied} implied" if state.implied else ""
     # Before its end, anything may still come to be needed.
-    said += f", {state.ahead} started early and not needed" if state.ahead and state.status == "finished" else ""
+    said += (
+        f", {state.ahead} started early and not needed"
+        if state.ahead and state.status == "finished"
+        else ""
+    )
     parts = " ".join(f"{counts[name]} {name}" for name in OUTCOME_ORDER if counts.get(name))
     return (f"{said}: {parts}" if parts else said, said, "")
 
@@ -229,7 +275,9 @@ def title(snapshot: Snapshot) -> str:
     said = "" if snapshot.status in ("running", "baseline") else f", {word}"
     left = remaining(state, snapshot.engine == "alive")
     done = state.tests_done
-    part = "" if left is None else f"{STEP * int(100 * done / max(1, done + left.tests[1]) / STEP)} % "
+    part = (
+        "" if left is None else f"{STEP * int(100 * done / max(1, done + left.tests[1]) / STEP)} % "
+    )
     return f"{sign} {part}{name}: {models}{said}"
 
 
@@ -241,5 +289,9 @@ def worth_a_look(before: Snapshot, now: Snapshot) -> str:
     state = now.state
     if status == "waiting":
         return "a reduction waits for you: accept or reject it"
-    said = ended(state) if status == "finished" else ", ".join(filter(None, (STATUS[status][1], state.reason)))
+    said = (
+        ended(state)
+        if status == "finished"
+        else ", ".join(filter(None, (STATUS[status][1], state.reason)))
+    )
     return f"{len(state.environment)} of {count(len(state.elements), 'model')} left; {plain(said)}"

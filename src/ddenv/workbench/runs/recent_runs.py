@@ -74,7 +74,12 @@ def _stamp(path: Path) -> tuple[int, ...]:
     log = path.with_name(f"{path.name}-wal")
     with suppress(OSError):
         logged = log.stat()
-        return (max(file.st_mtime_ns, logged.st_mtime_ns), file.st_size, logged.st_mtime_ns, logged.st_size)
+        return (
+            max(file.st_mtime_ns, logged.st_mtime_ns),
+            file.st_size,
+            logged.st_mtime_ns,
+            logged.st_size,
+        )
     return (file.st_mtime_ns, file.st_size, 0, 0)
 
 

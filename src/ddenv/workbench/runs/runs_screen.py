@@ -73,7 +73,9 @@ def bring_back(folder: Path) -> Path:
             continue
         path = folder / run.name
         if path.exists():
-            raise UserError(f"{path.stem}: there is a new run of this name; delete or rename that one first")
+            raise UserError(
+                f"{path.stem}: there is a new run of this name; delete or rename that one first"
+            )
         try:
             # The run comes last: without its log it would lack its last events.
             for each in sorted(place.iterdir(), key=lambda each: each == run):
@@ -107,7 +109,13 @@ class RunsScreen(Screen[None]):
         ("compare", "c", "compare", "compare", "compare the marked run with this one"),
         ("delete", "d", "delete", "delete", "delete it; u brings it back for a week"),
         ("undo", "u", "undo", "undo", "bring back the run that was deleted last"),
-        ("path", "o", "path", "open a file", "open a run by its path; or drop the file on the terminal"),
+        (
+            "path",
+            "o",
+            "path",
+            "open a file",
+            "open a run by its path; or drop the file on the terminal",
+        ),
         HELP,
         ("back", "escape,q,R", "back", "back", "back to the previous screen", "esc"),
     )
@@ -125,7 +133,11 @@ class RunsScreen(Screen[None]):
             with Framed("Runs", id="list", classes="panel"):
                 yield RunTable(id="table")
                 yield Static("reading ...", id="empty", markup=False)
-                yield Input(placeholder="a part of name, scenario, method or state", id="filter", compact=True)
+                yield Input(
+                    placeholder="a part of name, scenario, method or state",
+                    id="filter",
+                    compact=True,
+                )
                 yield PathEntry(placeholder="path of a run file (.ddenv); tab completes", id="path")
             with VerticalScroll(id="preview", classes="panel", can_focus=False) as panel:
                 panel.border_title = "This run"
@@ -160,7 +172,10 @@ class RunsScreen(Screen[None]):
     def _list(self) -> None:
         part = self.query_one("#filter", Input).value
         wanted = part.strip().casefold()
-        said = ((run, (run.path.stem, run.scenario, run.pair, run.algorithm, run.state_words)) for run in self._runs)
+        said = (
+            (run, (run.path.stem, run.scenario, run.pair, run.algorithm, run.state_words))
+            for run in self._runs
+        )
         found = (run for run, words in said if any(wanted in each.casefold() for each in words))
         shown = sorted(found, key=ORDERS[self._order])
         table = self.query_one(RunTable)
@@ -174,7 +189,9 @@ class RunsScreen(Screen[None]):
         empty.update(Text(nothing))
         works = sum(run.is_worked_on for run in self._runs)
         panel = self.query_one("#list")
-        panel.border_title = Text(f"Runs: {len(shown)} of {len(self._runs)}" if part else f"Runs: {len(self._runs)}")
+        panel.border_title = Text(
+            f"Runs: {len(shown)} of {len(self._runs)}" if part else f"Runs: {len(self._runs)}"
+        )
         now = [f"{count(works, 'engine')} running"] if works else []
         if self._marked is not None:
             now.append(f"marked: {shortened(plain(self._marked.stem), 20)}")

@@ -57,14 +57,24 @@ class RunList(OptionList):
 
 
 def about(run: Recent) -> Text:
-    text = Text(plain(run.path.stem), "bold").append(f"\n{plain(run.trouble)}" if run.trouble else "", "not bold")
+    text = Text(plain(run.path.stem), "bold").append(
+        f"\n{plain(run.trouble)}" if run.trouble else "", "not bold"
+    )
     if run.trouble:
         return text
-    text.append(f"\n{run.sign} {run.state_words}{f'; {plain(run.reason)}' if run.reason else ''}", "not bold")
+    text.append(
+        f"\n{run.sign} {run.state_words}{f'; {plain(run.reason)}' if run.reason else ''}",
+        "not bold",
+    )
     text.append(f"\n{plain(run.scenario)} by {plain(run.algorithm)}, {plain(run.pair)}", "not bold")
-    text.append(f"\n{brief(run.computed)} of simulations, {count(run.decisions, 'decision')} by hand", "not bold")
+    text.append(
+        f"\n{brief(run.computed)} of simulations, {count(run.decisions, 'decision')} by hand",
+        "not bold",
+    )
     left = first_of([plain(name) for name in run.kept], MOST_NAMES)
-    return text.append(f"\n{len(run.kept)} of {count(run.total, 'model')} left: {left}", "not bold dim")
+    return text.append(
+        f"\n{len(run.kept)} of {count(run.total, 'model')} left: {left}", "not bold dim"
+    )
 
 
 # All columns but the name, which takes the rest: title, width, whether it is a number, and its text.
@@ -141,7 +151,9 @@ class RunTable(DataTable[Text]):
         paths = [run.path for run in runs]
         followed = self._followed
         self._runs = list(runs)
-        if (self._wide, self._order) == (self.size.width, order) and paths == [run.path for run in before]:
+        if (self._wide, self._order) == (self.size.width, order) and paths == [
+            run.path for run in before
+        ]:
             for was, run in zip(before, runs, strict=True):
                 if run != was:
                     for column, cell in zip(self.ordered_columns, self._row(run), strict=True):
@@ -156,10 +168,14 @@ class RunTable(DataTable[Text]):
             if room - more[1] - AROUND >= NARROWEST_NAME:
                 self._shown.append(more)
                 room -= more[1] + AROUND
-        self._shown.insert(0, ("name", max(NARROWEST_NAME, room), False, lambda run: plain(run.path.stem)))
+        self._shown.insert(
+            0, ("name", max(NARROWEST_NAME, room), False, lambda run: plain(run.path.stem))
+        )
         for name, width, number, _ in self._shown:
             title = f"▾{name}" if name == order else name
-            self.add_column(Text(title, justify="right" if number else "left"), width=width, key=name)
+            self.add_column(
+                Text(title, justify="right" if number else "left"), width=width, key=name
+            )
         for run in runs:
             self.add_row(*self._row(run), key=str(run.path))
         if followed is not None and followed.path in paths:

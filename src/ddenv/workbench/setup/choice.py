@@ -113,13 +113,13 @@ class Choice:
                 "1 model: a run can only show whether the failure needs it.",
             )[self.models]
         if self.run:
-            return f"{words} As in the run {plain(self.path.stem)}. {plain(self.settings.description)}"
+            return (
+                f"{words} As in the run {plain(self.path.stem)}. {plain(self.settings.description)}"
+            )
         # The list has the name of a bundled file.
         where = "" if self.path.parent == SCENARIOS else f" {plain(str(self.path))}"
         if self.bare:
-            return (
-                f"{words} A world without a scenario: set the robot's spawn and goal, on the map or as numbers.{where}"
-            )
+            return f"{words} A world without a scenario: set the robot's spawn and goal, on the map or as numbers.{where}"
         return f"{words} {plain(self.settings.description)}{where}"
 
 
@@ -136,13 +136,19 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
             scenario, world, _ = read_parts(run)
         return Choice(path=path, world=world, settings=scenario, run=True)
     bare = is_read_as_world(path)
-    settings = scenario_for_world(path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0)) if bare else load_scenario(path)
+    settings = (
+        scenario_for_world(path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0)) if bare else load_scenario(path)
+    )
     try:
         world, chosen, missing = read_with_remedies(settings.world, settings.reading, options)
     except Unsupported as error:
         # Without the user's word it is left out on the map alone.
         choice = read_choice(path, {**options, "ignore": (*options.get("ignore", ()), error.tag)})
-        element = Missing(error.name, remembered().get(error.name, ""), "not supported, left out", UNSUPPORTED)
+        element = Missing(
+            error.name, remembered().get(error.name, ""), "not supported, left out", UNSUPPORTED
+        )
         return replace(choice, missing=(*choice.missing, element))
     settings = settings.model_copy(update={"reading": reading_of(settings.reading, **chosen)})
-    return Choice(path=path, world=world, settings=settings, bare=bare, options=chosen, missing=missing)
+    return Choice(
+        path=path, world=world, settings=settings, bare=bare, options=chosen, missing=missing
+    )

@@ -65,15 +65,28 @@ class OptionsForm(Vertical):
             with Grid(id="method"):
                 for kind in KINDS:
                     yield Label(kind, markup=False)
-                    yield Select([(name, name) for name in names(kind)], id=kind, allow_blank=False, compact=True)
+                    yield Select(
+                        [(name, name) for name in names(kind)],
+                        id=kind,
+                        allow_blank=False,
+                        compact=True,
+                    )
             yield Grid(*_widgets(form.BASIC), id="basic", classes="grid")
             yield Grid(*_widgets(form.PLACES), id="places", classes="grid")
-            yield Button(Content(MORE), id="more", compact=True, tooltip="the rarely used settings (f9)")
+            yield Button(
+                Content(MORE), id="more", compact=True, tooltip="the rarely used settings (f9)"
+            )
         yield Static("", id="wrong", markup=False)
         yield VerticalScroll(Static("", markup=False), id="explained")
         with Horizontal(id="last"):
             yield from _widgets((form.NAME, form.ACCEPT))
-            yield Button("▶ Start", id="start", variant="primary", compact=True, tooltip="start the reduction (ctrl+s)")
+            yield Button(
+                "▶ Start",
+                id="start",
+                variant="primary",
+                compact=True,
+                tooltip="start the reduction (ctrl+s)",
+            )
         yield Static("", id="cost", markup=False)
         yield Static("", id="command", markup=False)
 
@@ -91,7 +104,9 @@ class OptionsForm(Vertical):
 
     @property
     def method(self) -> tuple[str, str]:
-        algorithm, partitioning, prioritization = (str(self.query_one(f"#{kind}", Select).value) for kind in KINDS)
+        algorithm, partitioning, prioritization = (
+            str(self.query_one(f"#{kind}", Select).value) for kind in KINDS
+        )
         return f"{partitioning}/{prioritization}", algorithm
 
     @property
@@ -153,7 +168,11 @@ class OptionsForm(Vertical):
     def _explain(self, widget: Widget | None) -> None:
         """In a few lines that scroll, the field that has the focus, or else the algorithm, which most depends on."""
         # An open list of names is a widget inside its field.
-        near = [] if widget is None else [each.id for each in (widget, widget.parent) if each is not None]
+        near = (
+            []
+            if widget is None
+            else [each.id for each in (widget, widget.parent) if each is not None]
+        )
         id = next((each for each in near if each in FIELDS or each in KINDS), "") or ""
         pair, algorithm = self.method
         panel = self.query_one("#explained")
@@ -188,7 +207,9 @@ class OptionsForm(Vertical):
         """What the run will cost, and the command that does the same, or why there is none."""
         self.query_one("#cost", Static).update(Text(cost))
         command = self.query_one("#command", Static)
-        command.update(Text("$ " if typed and words else "", "bold").append(plain(words), "not bold"))
+        command.update(
+            Text("$ " if typed and words else "", "bold").append(plain(words), "not bold")
+        )
         command.tooltip = plain(words) or None
 
     def complain(self, error: UserError) -> None:
@@ -223,7 +244,11 @@ class OptionsForm(Vertical):
     def on_descendant_blur(self, event: events.DescendantBlur) -> None:
         """A field is checked when it is left; an empty one only at the start of a run."""
         one = FIELDS.get(event.widget.id or "")
-        if one is not None and (text := self.texts[one.name]).strip() and (wrong := form.problem(one, text)):
+        if (
+            one is not None
+            and (text := self.texts[one.name]).strip()
+            and (wrong := form.problem(one, text))
+        ):
             self._problems[one.name] = wrong
             self._show_problems()
 

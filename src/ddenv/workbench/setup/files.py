@@ -50,7 +50,11 @@ def remember(path: Path) -> None:
 
 def _listed() -> list[Path]:
     names = read_state(RECENT)
-    return [Path(name) for name in names if isinstance(name, str) and name] if isinstance(names, list) else []
+    return (
+        [Path(name) for name in names if isinstance(name, str) and name]
+        if isinstance(names, list)
+        else []
+    )
 
 
 class FileList(OptionList):
@@ -88,9 +92,14 @@ class FileList(OptionList):
 
     def _fill(self) -> None:
         like = [] if self._like is None else [_option(self._like, f"as {self._like.stem}", "a run")]
-        recent = [_option(path, path.name if is_world(path) else path.stem, path.parent.name) for path in self._recent]
+        recent = [
+            _option(path, path.name if is_world(path) else path.stem, path.parent.name)
+            for path in self._recent
+        ]
         line = [None] if recent else []
-        self.set_options([*like, *(_option(path, path.stem, "") for path in self._bundled), *line, *recent])
+        self.set_options(
+            [*like, *(_option(path, path.stem, "") for path in self._bundled), *line, *recent]
+        )
 
     @on(OptionList.OptionHighlighted)
     def _cursor_moved(self, event: OptionList.OptionHighlighted) -> None:
@@ -117,7 +126,8 @@ class WorldTree(DirectoryTree):
         return [
             path
             for path in paths
-            if not path.name.startswith(".") and (is_folder(path) or path.suffix.lower() in SUFFIXES)
+            if not path.name.startswith(".")
+            and (is_folder(path) or path.suffix.lower() in SUFFIXES)
         ]
 
     def process_label(self, label: TextType) -> Text:
@@ -140,7 +150,9 @@ def complain(dialog: Screen[Any], words: str) -> None:
 class OpenFile(ModalScreen[Path | None]):
     """Asks for a scenario or world file."""
 
-    BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="open.cancel", tooltip="choose no file")]
+    BINDINGS: ClassVar = [
+        Binding("escape", "dismiss(None)", "cancel", id="open.cancel", tooltip="choose no file")
+    ]
 
     def compose(self) -> ComposeResult:
         with Framed(
@@ -213,7 +225,9 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
 class SaveScenario(ModalScreen[Path | None]):
     """Returns the file that was written, or None. An existing file is only replaced after a second enter."""
 
-    BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="save.cancel", tooltip="write nothing")]
+    BINDINGS: ClassVar = [
+        Binding("escape", "dismiss(None)", "cancel", id="save.cancel", tooltip="write nothing")
+    ]
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__()
@@ -221,9 +235,14 @@ class SaveScenario(ModalScreen[Path | None]):
         self._replace: Path | None = None
 
     def compose(self) -> ComposeResult:
-        stem = "".join(char if char.isalnum() or char in "-_" else "-" for char in self._scenario.name)
+        stem = "".join(
+            char if char.isalnum() or char in "-_" else "-" for char in self._scenario.name
+        )
         with Framed("Save as a scenario", "enter saves   escape cancels"):
-            yield Static("A YAML file with all of these settings, for 'ddenv run' and for this list.", markup=False)
+            yield Static(
+                "A YAML file with all of these settings, for 'ddenv run' and for this list.",
+                markup=False,
+            )
             yield PathEntry(f"{stem[:60]}.yaml", placeholder="name of a file", id="path")
             yield Static("", id="wrong", classes="wrong", markup=False)
 
@@ -238,7 +257,9 @@ class SaveScenario(ModalScreen[Path | None]):
             path = scenario_path(event.value)
             if is_file(path) and path != self._replace:
                 self._replace = path
-                raise UserError(f"{path} exists already: enter again replaces it, or type another name")
+                raise UserError(
+                    f"{path} exists already: enter again replaces it, or type another name"
+                )
             self._write(path)
 
     @work(thread=True, group="save", exclusive=True)

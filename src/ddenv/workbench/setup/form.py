@@ -18,18 +18,36 @@ OFF = "off"
 LONGEST_NUMBER = 10
 
 
-def _place(name: str, meaning: str, unit: str = "m", most: float = FARTHEST, more: str = "") -> Setting:
-    return Setting(default=None, meaning=meaning, unit=unit, least=-most, most=most, more=more, name=name, kind=float)
+def _place(
+    name: str, meaning: str, unit: str = "m", most: float = FARTHEST, more: str = ""
+) -> Setting:
+    return Setting(
+        default=None,
+        meaning=meaning,
+        unit=unit,
+        least=-most,
+        most=most,
+        more=more,
+        name=name,
+        kind=float,
+    )
 
 
 BASIC = (*(one for one in OPTIONS if one.shown == "basic"), JOBS)
 SPAWN = (
     _place("spawn_x", "where the robot starts"),
     _place("spawn_y", "where the robot starts"),
-    _place("spawn_z", "height of the robot's frame at the start", more="A place picked on the map fills it in."),
+    _place(
+        "spawn_z",
+        "height of the robot's frame at the start",
+        more="A place picked on the map fills it in.",
+    ),
     _place("yaw", "heading at the start, counterclockwise from x", "rad", TURNS),
 )
-GOAL = (_place("goal_x", "where the robot has to go"), _place("goal_y", "where the robot has to go"))
+GOAL = (
+    _place("goal_x", "where the robot has to go"),
+    _place("goal_y", "where the robot has to go"),
+)
 PLACES = (*SPAWN, *GOAL)
 ADVANCED = tuple(one for one in OPTIONS if one.shown == "more")
 NAMED = "the name of the run: a file in the runs folder, or a path that ends in .ddenv"
@@ -121,7 +139,9 @@ def texts_of(scenario: Scenario) -> dict[str, str]:
         if one.key:
             value = read(data, one)
             text = text_of(value)
-            texts[one.name] = f"{value:.3g}" if isinstance(value, float) and len(text) > LONGEST_NUMBER else text
+            texts[one.name] = (
+                f"{value:.3g}" if isinstance(value, float) and len(text) > LONGEST_NUMBER else text
+            )
     return texts | {name: text_of(number) for name, number in places_of(scenario).items()}
 
 
@@ -134,7 +154,11 @@ def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str
     before = texts_of(base)
     given = values(tuple(FIELDS[name] for name in before), texts)
     # What is unchanged is not asked for: one field may set what others show, and a long number is shown rounded.
-    known = {name: one for name, one in SETTINGS.items() if name in given and texts.get(name) != before[name]}
+    known = {
+        name: one
+        for name, one in SETTINGS.items()
+        if name in given and texts.get(name) != before[name]
+    }
     chosen = {name: given[name] for name, one in known.items() if given[name] != read(data, one)}
     data = with_values(data, chosen | {"pair": pair, "algorithm": algorithm})
     for fields, place in ((SPAWN, data["robot"]["spawn"]), (GOAL, data["goal"])):
@@ -145,6 +169,8 @@ def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str
 def numbers(fields: tuple[Setting, ...], texts: Mapping[str, str]) -> tuple[float, ...] | None:
     """The numbers of `SPAWN` or `GOAL`; None while one of them is wrong or missing."""
     try:
-        return tuple(float(number) for number in values(fields, texts).values() if number is not None)
+        return tuple(
+            float(number) for number in values(fields, texts).values() if number is not None
+        )
     except FieldError:
         return None

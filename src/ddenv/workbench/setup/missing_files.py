@@ -63,7 +63,9 @@ class Missing:
 
 def kinds(rows: Iterable[Missing]) -> str:
     """How many of each kind there are, such as "2 missing files, 1 unsupported element"."""
-    return ", ".join(count(number, kind) for kind, number in Counter(row.kind for row in rows).items())
+    return ", ".join(
+        count(number, kind) for kind, number in Counter(row.kind for row in rows).items()
+    )
 
 
 def read_with_remedies(
@@ -101,8 +103,15 @@ def read_with_remedies(
     missing = []
     for uri, text in found.items():
         begin = f"'{uri}' by "
-        by = next((note.why.removeprefix(begin) for note in world.notes if note.why.startswith(begin)), "left out")
-        words = f"in {text}" if text.startswith("/") else by.removeprefix("a guess, ").removeprefix("the stand-in ")
+        by = next(
+            (note.why.removeprefix(begin) for note in world.notes if note.why.startswith(begin)),
+            "left out",
+        )
+        words = (
+            f"in {text}"
+            if text.startswith("/")
+            else by.removeprefix("a guess, ").removeprefix("the stand-in ")
+        )
         if not text:
             words = f"not in {vain[uri]}; guess {words}" if uri in vain else f"guess {words}"
         kind = MISSING
@@ -124,7 +133,13 @@ class MissingList(OptionList):
     BINDINGS: ClassVar = keys(
         "missing",
         ("choose", "enter", "select", "remedy", "choose a folder or a shape, or leave it out"),
-        ("guess", "a", "guess", "guess", "take the guessed shape for all undecided files, or else for this one"),
+        (
+            "guess",
+            "a",
+            "guess",
+            "guess",
+            "take the guessed shape for all undecided files, or else for this one",
+        ),
         ("without", "w", "without", "without", "leave this one out"),
     )
 
@@ -144,11 +159,19 @@ class MissingList(OptionList):
         same = [row.uri for row in rows] == [row.uri for row in self._rows]
         place = self.highlighted if same else None
         self._rows = rows
-        of_files = tuple(note for note in notes if not any(f"'{row.uri}'" in note.why for row in rows))
+        of_files = tuple(
+            note for note in notes if not any(f"'{row.uri}'" in note.why for row in rows)
+        )
         self.set_options([Option(self._line(row), id=row.uri) for row in rows])
-        for (what, kind, why), number in Counter((note.what, note.kind, note.why) for note in of_files).items():
+        for (what, kind, why), number in Counter(
+            (note.what, note.kind, note.why) for note in of_files
+        ).items():
             parts = f"{plain(what)} × {number}" if number > 1 else plain(what)
-            text = Text(no_wrap=True, overflow="ellipsis").append(f"  {kind} {parts}  ").append(plain(why), "dim")
+            text = (
+                Text(no_wrap=True, overflow="ellipsis")
+                .append(f"  {kind} {parts}  ")
+                .append(plain(why), "dim")
+            )
             self.add_option(Option(text))
         undecided = [index for index, row in enumerate(rows) if not row.remedy]
         first = next(iter(undecided), 0) if place is None else place
@@ -163,7 +186,9 @@ class MissingList(OptionList):
 
     def _line(self, row: Missing) -> Text:
         color = self.app.theme_variables["text-success" if row.remedy else "text-warning"]
-        text = Text(no_wrap=True, overflow="ellipsis").append(DONE if row.remedy else OPEN, f"bold {color}")
+        text = Text(no_wrap=True, overflow="ellipsis").append(
+            DONE if row.remedy else OPEN, f"bold {color}"
+        )
         # The last word of a URI tells models and meshes apart.
         name = plain(unquote(row.uri).rstrip("/").rsplit("/", 1)[-1]) or plain(row.uri)
         return text.append(f" {name}  ").append(plain(row.words), "dim")
@@ -203,7 +228,9 @@ class MissingList(OptionList):
 class AskRemedy(ModalScreen[str | None]):
     """Asks for the remedy of one missing file."""
 
-    BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", id="remedy.cancel", tooltip="change nothing")]
+    BINDINGS: ClassVar = [
+        Binding("escape", "dismiss(None)", "cancel", id="remedy.cancel", tooltip="change nothing")
+    ]
 
     def __init__(self, row: Missing) -> None:
         super().__init__()

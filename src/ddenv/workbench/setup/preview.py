@@ -175,12 +175,18 @@ class Preview(Vertical):
         self._form.suggest_name(name)
         if again:
             self.show_places()
-            if self.picked_next and self.missing.has_focus and all(row.remedy for row in choice.missing):
+            if (
+                self.picked_next
+                and self.missing.has_focus
+                and all(row.remedy for row in choice.missing)
+            ):
                 # A place is picked next.
                 self.map.focus()
         else:
             texts = self._form.texts if self._keeps_places else {}
-            places = {one.name: texts.get(one.name, "") for one in form.PLACES} if choice.bare else {}
+            places = (
+                {one.name: texts.get(one.name, "") for one in form.PLACES} if choice.bare else {}
+            )
             self._form.show_settings(choice.settings, places)
         self.post_message(self.Read(opened and not again))
 
@@ -265,7 +271,9 @@ class Preview(Vertical):
             self._form.set_texts({"spawn_z": self._ground_z, "yaw": texts["yaw"] or "0"})
         spawn = self.spawn
         goal = self.goal
-        self.map.set_marks((spawn[0], spawn[1], spawn[3]) if spawn else None, (goal[0], goal[1]) if goal else None)
+        self.map.set_marks(
+            (spawn[0], spawn[1], spawn[3]) if spawn else None, (goal[0], goal[1]) if goal else None
+        )
         self._show_picking()
         self._look_at_start(choice, spawn, goal)
 
@@ -314,22 +322,38 @@ class Preview(Vertical):
         line.set_class(bool(what), "-on")
         text = Text(no_wrap=True, overflow="ellipsis")
         if what:
-            line.update(text.append("▶ ", "bold").append(ASKS[what]).append("   escape stops", "dim"))
+            line.update(
+                text.append("▶ ", "bold").append(ASKS[what]).append("   escape stops", "dim")
+            )
             return
         spawn = self.spawn
         goal = self.goal
         if self.choice is None:
             line.update("")
         elif spawn is None and goal is None and self.choice.bare:
-            line.update(text.append("no start and goal yet: ").append("s", "bold").append(" sets them on the map"))
+            line.update(
+                text.append("no start and goal yet: ")
+                .append("s", "bold")
+                .append(" sets them on the map")
+            )
         else:
             heading = f"{arrow(spawn[3])} {math.degrees(spawn[3]):.0f}°" if spawn else "?"
             where = {"start": _point(spawn), "heading": heading, "goal": _point(goal)}
-            forms = [_places(where, where), _places(where, ("start", "goal"), "  "), _places(where, (), "  ")]
-            line.update(next((form for form in forms if form.cell_len <= line.content_size.width), forms[-1]))
+            forms = [
+                _places(where, where),
+                _places(where, ("start", "goal"), "  "),
+                _places(where, (), "  "),
+            ]
+            line.update(
+                next(
+                    (form for form in forms if form.cell_len <= line.content_size.width), forms[-1]
+                )
+            )
 
     @work(thread=True, group="notes", exclusive=True)
-    def _look_at_start(self, choice: Choice, spawn: tuple[float, ...] | None, goal: tuple[float, ...] | None) -> None:
+    def _look_at_start(
+        self, choice: Choice, spawn: tuple[float, ...] | None, goal: tuple[float, ...] | None
+    ) -> None:
         """Shows what is wrong with the start, as the run would note it, and where it had better be."""
         from ddenv.world.placement import note_inside, notes_on_start, stands_inside
         from ddenv.world.scenario import Spawn
@@ -341,7 +365,11 @@ class Preview(Vertical):
         with suppress(UserError):
             if spawn is not None and (robot := choice.robot):
                 start = Spawn(x=spawn[0], y=spawn[1], z=spawn[2], yaw=spawn[3])
-                end = choice.settings.goal.model_copy(update={"x": goal[0], "y": goal[1]}) if goal else None
+                end = (
+                    choice.settings.goal.model_copy(update={"x": goal[0], "y": goal[1]})
+                    if goal
+                    else None
+                )
                 found = tuple(notes_on_start(choice.world, robot, start, end))
                 if (inside := stands_inside(choice.world, robot, start, end)) is not None:
                     why, place = inside
@@ -366,7 +394,9 @@ class Preview(Vertical):
         line = self.query_one("#about", Static)
         words = "" if self.choice is None else self.choice.about
         most = line.styles.max_height
-        lines = wrap(words, max(3, line.content_size.width), max_lines=most and most.cells, placeholder=" …")
+        lines = wrap(
+            words, max(3, line.content_size.width), max_lines=most and most.cells, placeholder=" …"
+        )
         line.update(Text("\n".join(lines) if lines and lines[-1].endswith(" …") else words))
         line.tooltip = words or None
 

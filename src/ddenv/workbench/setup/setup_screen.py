@@ -71,13 +71,26 @@ class SetupScreen(Screen[None]):
         ("start", "ctrl+s,f5", "start", "start", "start the reduction", "^s"),
         ("baseline", "f6,ctrl+b", "start(True)", "baseline", BASELINE, "f6"),
         ("save", "f7,ctrl+g", "save", "save", "save as a scenario file", "f7"),
-        ("copy", "f8,ctrl+y", "copy", "copy", "copy the ddenv run command that does the same", "f8"),
+        (
+            "copy",
+            "f8,ctrl+y",
+            "copy",
+            "copy",
+            "copy the ddenv run command that does the same",
+            "f8",
+        ),
         ("more", "f9", "more", "more", "show or hide the rarely used settings"),
         ("open", "ctrl+o", "open", "open", "choose a scenario or world file"),
         ("pick_start", "s", "pick('start')", "start", "set the start on the map"),
         ("pick_heading", "h", "pick('heading')", "heading", "set the heading on the map"),
         ("pick_goal", "g", "pick('goal')", "goal", "set the goal on the map"),
-        ("missing", "m", "missing", "missing", "to what cannot be used, such as missing files, and its remedies"),
+        (
+            "missing",
+            "m",
+            "missing",
+            "missing",
+            "to what cannot be used, such as missing files, and its remedies",
+        ),
         *MAP_KEYS,
         ("choose", "f2", "pane('choose')", "choose", "to the scenarios, worlds and runs"),
         ("map", "f3", "pane('map')", "map", "to the map"),
@@ -119,7 +132,9 @@ class SetupScreen(Screen[None]):
             yield Panes(PANES, id="panes")
         with Horizontal(id="body"):
             with Vertical(id="choice"):
-                with Framed("Scenarios and worlds", "^o opens a file", id="scenarios", classes="panel"):
+                with Framed(
+                    "Scenarios and worlds", "^o opens a file", id="scenarios", classes="panel"
+                ):
                     yield FileList(id="scenario-list")
                 with Framed("Recent runs", "enter opens", id="runs", classes="panel"):
                     yield RunList(id="run-list")
@@ -232,14 +247,20 @@ class SetupScreen(Screen[None]):
         (pair, algorithm) = self.form.method
         if choice is None:
             awaited = "the world is still being read: try again in a moment"
-            raise UserError(awaited if self.preview.awaited else "choose a scenario or a world that can be read")
+            raise UserError(
+                awaited if self.preview.awaited else "choose a scenario or a world that can be read"
+            )
         # A guess is shown, but only run with if the user takes it.
         if undecided := [each for each in choice.missing if not each.remedy]:
             raise UserError(f"{kinds(undecided)} without a remedy: press m")
         return choice, form.asked_of(choice.settings, self.form.texts, pair, algorithm)
 
     def _command(self, choice: Choice, scenario: Scenario) -> list[str]:
-        return [] if choice.run else command_words(choice, scenario, self.form.jobs, self.form.own_name)
+        return (
+            []
+            if choice.run
+            else command_words(choice, scenario, self.form.jobs, self.form.own_name)
+        )
 
     def action_copy(self) -> None:
         try:
@@ -288,7 +309,13 @@ class SetupScreen(Screen[None]):
 
     @work(thread=True, group="start", exclusive=True)
     def _create(
-        self, choice: Choice, scenario: Scenario, path: Path, jobs: int, mode: str, only_baseline: bool
+        self,
+        choice: Choice,
+        scenario: Scenario,
+        path: Path,
+        jobs: int,
+        mode: str,
+        only_baseline: bool,
     ) -> None:
         try:
             engine = create(choice, scenario, path, jobs, mode, only_baseline)

@@ -82,7 +82,9 @@ def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
     baseline = reduction.baseline_runs
     search = rounded(rough.search[1])
     certificate = rounded(rough.certificate[1])
-    parts = f"{baseline} for the baseline, {search} for the search, {certificate} for the certificate"
+    parts = (
+        f"{baseline} for the baseline, {search} for the search, {certificate} for the certificate"
+    )
     if budget is not None and middle >= budget:
         # The certificate may not be reached.
         words = f"{count(budget, 'test')} at most"
@@ -122,7 +124,10 @@ def command_words(choice: Choice, asked: Scenario, jobs: int, name: str = "") ->
             continue
         given = [values] if isinstance(values, str) else values or ()
         for value in given:
-            words += [f"--{option.replace('_', '-')}", str(value.absolute()) if isinstance(value, Path) else str(value)]
+            words += [
+                f"--{option.replace('_', '-')}",
+                str(value.absolute()) if isinstance(value, Path) else str(value),
+            ]
     if jobs != processor.usable_cores():
         words += ["--jobs", str(jobs)]
     if len(Path(name).parts) > 1:
@@ -130,7 +135,9 @@ def command_words(choice: Choice, asked: Scenario, jobs: int, name: str = "") ->
     return [*words, "--name", name] if name else words
 
 
-def create(choice: Choice, scenario: Scenario, path: Path, jobs: int, accept_mode: str, only_baseline: bool) -> Engine:
+def create(
+    choice: Choice, scenario: Scenario, path: Path, jobs: int, accept_mode: str, only_baseline: bool
+) -> Engine:
     """Writes the run file `path` and starts its engine, with `jobs` tests at a time. Raises UserError."""
     from ddenv.runfile.store import RunFile
     from ddenv.runs.creation import create_like, create_run
@@ -154,7 +161,11 @@ def run_file(scenario_name: str, name: str) -> Path:
     """The path of a new run with this `name` or path. Raises FieldError."""
     is_path = len(Path(name).parts) > 1
     try:
-        path = run_path(scenario_name, None, Path(name)) if is_path else run_path(scenario_name, name, None)
+        path = (
+            run_path(scenario_name, None, Path(name))
+            if is_path
+            else run_path(scenario_name, name, None)
+        )
         wrong = f"{path} exists already; choose another name" if path.exists() else ""
     except UserError as error:
         wrong = str(error).partition(": ")[2]

@@ -22,7 +22,18 @@ def keys(screen: str, *rows: tuple[str, ...], priority: bool = False) -> list[Bi
     found: list[BindingType] = []
     for name, each, action, word, words, *display in rows:
         shown = display[0] if display else None
-        found.append(Binding(each, action, word, True, shown, priority=priority, tooltip=words, id=f"{screen}.{name}"))
+        found.append(
+            Binding(
+                each,
+                action,
+                word,
+                True,
+                shown,
+                priority=priority,
+                tooltip=words,
+                id=f"{screen}.{name}",
+            )
+        )
     return found
 
 

@@ -36,7 +36,11 @@ class Log:
     def until(self, event: int | None) -> list[Entry]:
         """The entries of an event and of all before it; all there are for None."""
         found = self._entries
-        return found[:] if event is None else found[: bisect_right(found, event, key=lambda entry: entry.event)]
+        return (
+            found[:]
+            if event is None
+            else found[: bisect_right(found, event, key=lambda entry: entry.event)]
+        )
 
     def add(self, kind: str, before: RunState, after: RunState) -> None:
         from ddenv.words.news import news
@@ -65,7 +69,9 @@ def decision_lines(decision: Decision, width: int) -> list[Text]:
 
 def _in_lines(at: float, words: str, width: int, hanging: str = "") -> list[Text]:
     indent = " " * (len(words) - len(words.lstrip()))
-    first, *more = wrap(plain(words), max(12, width - len(BEGIN) - len(indent) - len(hanging))) or [""]
+    first, *more = wrap(plain(words), max(12, width - len(BEGIN) - len(indent) - len(hanging))) or [
+        ""
+    ]
     line = Text(time.strftime("%H:%M:%S", time.localtime(at)), "dim", no_wrap=True)
     line.append(f"  {indent}{first}", "not dim")
     return [line, *(Text(f"{BEGIN}{indent}{hanging}{each}", no_wrap=True) for each in more)]

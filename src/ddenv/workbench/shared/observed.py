@@ -44,7 +44,9 @@ class Observed(RunFile):
         """Whether there may be something new since the last call. Raises Gone, Busy, or UserError if it cannot be read."""
         place = _place(self.path)
         if place[:2] != self._origin[:2]:
-            raise Gone(f"{self.path}: the run file was {'replaced' if place[1] else 'deleted'} while it was open")
+            raise Gone(
+                f"{self.path}: the run file was {'replaced' if place[1] else 'deleted'} while it was open"
+            )
         if place != self._place:
             # Without a log the file is open as immutable; now somebody writes it.
             self._db.close()
@@ -72,7 +74,9 @@ class Observed(RunFile):
     def _open(self, place: _Place) -> None:
         _, _, logged, shared, _ = place
         if logged and not shared and self._strictly:
-            raise UserError(f"{self.path}: its last writer crashed; open it once without --watch to repair it")
+            raise UserError(
+                f"{self.path}: its last writer crashed; open it once without --watch to repair it"
+            )
         # All connections of a process share one index: while this one cannot write it, none can, and nothing could be sent.
         index = "&readonly_shm=1" if shared and self._strictly else ""
         how = f"mode=ro{index}" if logged else "immutable=1"
@@ -89,7 +93,10 @@ class Observed(RunFile):
         try:
             return self._db.execute(query, values).fetchall()
         except (sqlite3.Error, OverflowError) as error:
-            if isinstance(error, sqlite3.OperationalError) and error.sqlite_errorcode & 0xFF in _BUSY:
+            if (
+                isinstance(error, sqlite3.OperationalError)
+                and error.sqlite_errorcode & 0xFF in _BUSY
+            ):
                 raise Busy(f"{self.path}: another program is writing") from None
             raise UserError(f"{self.path}: damaged run file: {error}") from None
 
@@ -106,7 +113,13 @@ def _place(path: Path) -> _Place:
     shared = log is not None and _stat(f"{path}-shm") is not None
     logged = shared or (log is not None and log.st_size > 0)
     # With a log the file's own age and size say nothing about new events.
-    return file.st_dev, file.st_ino, logged, shared, (0, 0) if logged else (file.st_mtime_ns, file.st_size)
+    return (
+        file.st_dev,
+        file.st_ino,
+        logged,
+        shared,
+        (0, 0) if logged else (file.st_mtime_ns, file.st_size),
+    )
 
 
 def _stat(path: str | Path) -> os.stat_result | None:

@@ -102,7 +102,11 @@ class Poll:
         if last is not None and not self._behind:
             # The time goes on.
             spent = self._spent(engine)
-            return last if (engine, spent) == (last.engine, last.spent) else replace(last, engine=engine, spent=spent)
+            return (
+                last
+                if (engine, spent) == (last.engine, last.spent)
+                else replace(last, engine=engine, spent=spent)
+            )
         error, more = self._follow()
         state = self._state
         spent = self._spent(engine)
@@ -111,13 +115,32 @@ class Poll:
             # The robot's paths on the last similar run and in f, each read once.
             ways = (state.evidence_test, None if state.f_test is None else state.f_test.id)
             known = self._motions
-            self._motions = {test: known[test] if test in known else self.file.motion(test) for test in ways if test}
+            self._motions = {
+                test: known[test] if test in known else self.file.motion(test)
+                for test in ways
+                if test
+            }
             evidence, original = (self._motions.get(test or 0) for test in ways)
-            snapshot = Snapshot(state=state, live=live, engine=engine, evidence=evidence, spent=spent, error=error, original=original)
+            snapshot = Snapshot(
+                state=state,
+                live=live,
+                engine=engine,
+                evidence=evidence,
+                spent=spent,
+                error=error,
+                original=original,
+            )
         except Busy:
             raise
         except UserError as trouble:
-            snapshot = Snapshot(state=state, live=(), engine=engine, evidence=None, spent=spent, error=error or str(trouble))
+            snapshot = Snapshot(
+                state=state,
+                live=(),
+                engine=engine,
+                evidence=None,
+                spent=spent,
+                error=error or str(trouble),
+            )
             due = True
         self._behind = more or not due
         self._catching_up = more
@@ -132,7 +155,9 @@ class Poll:
         try:
             while more:
                 more = False
-                for event, before, after in steps(self.file.read(self._state.revision, SOME_EVENTS), self._state):
+                for event, before, after in steps(
+                    self.file.read(self._state.revision, SOME_EVENTS), self._state
+                ):
                     self._state = after
                     self._on_event(event.kind, before, after)
                     more = True
@@ -165,10 +190,18 @@ class Poll:
         self._posed = moment
         try:
             rows = self.file.live()
-            known = (row for row in rows if 0 < row.test <= len(state.tests) and len(row.pose) == COLUMNS - 1)
-            return tuple(row for row in known if all(map(math.isfinite, (row.time, *row.pose)))), True
+            known = (
+                row
+                for row in rows
+                if 0 < row.test <= len(state.tests) and len(row.pose) == COLUMNS - 1
+            )
+            return tuple(
+                row for row in known if all(map(math.isfinite, (row.time, *row.pose)))
+            ), True
         except (TypeError, ValueError):
-            raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
+            raise UserError(
+                f"{self.path}: damaged run file: the pose of a running test is invalid"
+            ) from None
 
     def _spent(self, engine: EngineIs) -> int:
         return int(spent(self._state, now() if engine == "alive" else self._state.updated_at))

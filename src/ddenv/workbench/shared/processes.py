@@ -34,7 +34,9 @@ class Engine:
         from ddenv.runs.programs import start_engine
 
         try:
-            self._process = start_engine(self.run, max(1, jobs), accept_mode=accept_mode, attended="yes", **options)
+            self._process = start_engine(
+                self.run, max(1, jobs), accept_mode=accept_mode, attended="yes", **options
+            )
         except OSError as error:
             raise UserError(f"{self.run}: the engine cannot be started: {error.strerror}") from None
         self._worked = False
@@ -96,7 +98,10 @@ class Scene:
         # A scene that hangs must not stop the screen, and one that has ended needs nothing.
         with suppress(OSError):
             os.set_blocking(self._process.stdin.fileno(), False)
-            os.write(self._process.stdin.fileno(), f"{json.dumps(reading.plain(self._wanted))}\n".encode())
+            os.write(
+                self._process.stdin.fileno(),
+                f"{json.dumps(reading.plain(self._wanted))}\n".encode(),
+            )
 
     def wait(self) -> None:
         """Blocks until the program has printed its URL or has ended: not for the screen's thread."""

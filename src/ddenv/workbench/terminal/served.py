@@ -94,14 +94,20 @@ def guard(port: int, token: str) -> Any:
             raise web.HTTPForbidden(
                 text="the address of this workbench has a token; copy all of it from 'ddenv serve'\n"
             )
-        if request.host not in own or (origin is not None and origin.removeprefix("http://") not in own):
+        if request.host not in own or (
+            origin is not None and origin.removeprefix("http://") not in own
+        ):
             raise web.HTTPForbidden(text=f"open http://{HOST}:{port} itself\n")
         response = await handler(request)
         if not response.prepared:
             # Other pages must not show it in a frame to catch clicks.
             response.headers["X-Frame-Options"] = "DENY"
             response.headers["Referrer-Policy"] = "no-referrer"
-            text = response.text if response.content_type == "text/html" and hasattr(response, "text") else ""
+            text = (
+                response.text
+                if response.content_type == "text/html" and hasattr(response, "text")
+                else ""
+            )
             # What a page may load and run: the terminal of textual-serve, and the connection to the workbench.
             rules = {
                 "script-src": f"'self' {of_scripts(text or '')}".strip(),

@@ -63,7 +63,9 @@ def theme_called(name: str, where: str) -> str:
     """The theme of this `name`. Raises UserError with a message that begins with `where`."""
     if name in theme_names():
         return name
-    raise UserError(f"{where}: there is no theme '{name}'{nearest(name, theme_names())}; 'ddenv config' lists them")
+    raise UserError(
+        f"{where}: there is no theme '{name}'{nearest(name, theme_names())}; 'ddenv config' lists them"
+    )
 
 
 def fitting(color_system: str | None) -> str:
@@ -74,9 +76,15 @@ def fitting(color_system: str | None) -> str:
 def for_rich(variables: Mapping[str, str]) -> dict[str, str]:
     """A theme's variables, with Rich's names for the terminal's own colours: not ansi_red 50% but red."""
     ansi = {
-        key: value.split()[0].removeprefix("ansi_") for key, value in variables.items() if value.startswith("ansi_")
+        key: value.split()[0].removeprefix("ansi_")
+        for key, value in variables.items()
+        if value.startswith("ansi_")
     }
-    return {**variables, **ansi, **{key: "default" for key, value in variables.items() if value == "transparent"}}
+    return {
+        **variables,
+        **ansi,
+        **{key: "default" for key, value in variables.items() if value == "transparent"},
+    }
 
 
 def ink(variables: Mapping[str, str], name: str, *, bold: bool = False) -> Style:
@@ -84,7 +92,9 @@ def ink(variables: Mapping[str, str], name: str, *, bold: bool = False) -> Style
     try:
         value = variables[name]
         # In Textual `blue` is the web's colour, not the terminal's.
-        color = RichColor.parse(value) if value in ANSI_COLOR_NAMES else Color.parse(value).rich_color
+        color = (
+            RichColor.parse(value) if value in ANSI_COLOR_NAMES else Color.parse(value).rich_color
+        )
     except (KeyError, ColorParseError):
         color = None
     return Style(color=color, bold=bold or None)

@@ -54,7 +54,9 @@ class Written:
             before = row[x : x + width]
             row[x : x + width] = cells if plain else [None] * width
             for first, last in _differing(before, cells) if plain else [(0, width)]:
-                found.append(f"\x1b[{y + 1};{x + first + 1}H{strip.crop(first, last).render(console)}")
+                found.append(
+                    f"\x1b[{y + 1};{x + first + 1}H{strip.crop(first, last).render(console)}"
+                )
         return "".join(found)
 
 

@@ -66,15 +66,40 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
         sign = partition_letter(number)
         ways = ("with", "without")
         rates = (
-            f"{rate(claim)}; {meaning(claim, certificate)}." if claim is not None and certificate is not None else ""
+            f"{rate(claim)}; {meaning(claim, certificate)}."
+            if claim is not None and certificate is not None
+            else ""
         )
         more = rates, parting_sentence(each)
-        models.append(Entry(name=each.without, letter=sign, gone=each.gone, sentence=sentence(each), more=more, parting=each.parting, ways=ways, snapshot=snapshot, claim=claim))
+        models.append(
+            Entry(
+                name=each.without,
+                letter=sign,
+                gone=each.gone,
+                sentence=sentence(each),
+                more=more,
+                parting=each.parting,
+                ways=ways,
+                snapshot=snapshot,
+                claim=claim,
+            )
+        )
     if (one := nearest(file, state)) is not None:
         # The whole world fails, and without these it passes.
         whole = snapshot_with(state, state.elements, (one.gone,) if one.gone else ())
         ways = ("fails", "passes")
-        last = [Entry(name=NEAREST, letter="A", gone=one.gone, sentence=one.sentences, more=(), parting=one.parting, ways=ways, snapshot=whole)]
+        last = [
+            Entry(
+                name=NEAREST,
+                letter="A",
+                gone=one.gone,
+                sentence=one.sentences,
+                more=(),
+                parting=one.parting,
+                ways=ways,
+                snapshot=whole,
+            )
+        ]
     return (*models, *last, *_of_numbers(file, state)), len(found) - len(listed)
 
 
@@ -94,10 +119,24 @@ def _of_numbers(file: RunFile, state: RunState) -> Iterator[Entry]:
             f"Again: ddenv test {run} --minimal{given} --repeat 10",
             f"As a world: ddenv export {run}{given} --output changed.sdf",
         )
-        limits = tuple((verdict, ring) for verdict, model, moved in one.limits for ring in rings(model, moved))
+        limits = tuple(
+            (verdict, ring) for verdict, model, moved in one.limits for ring in rings(model, moved)
+        )
         figures = f"{'goal' if one.verdict == 'goal' else 'no f'} at {value}"
         ways = ("now", f"at {value}")
-        yield Entry(name=one.name, letter="", gone=(), sentence=one.sentence, more=more, parting=one.parting, ways=ways, snapshot=snapshot, claim=None, limits=limits, figures=figures)
+        yield Entry(
+            name=one.name,
+            letter="",
+            gone=(),
+            sentence=one.sentence,
+            more=more,
+            parting=one.parting,
+            ways=ways,
+            snapshot=snapshot,
+            claim=None,
+            limits=limits,
+            figures=figures,
+        )
 
 
 def head(width: int) -> Text:
@@ -118,7 +157,9 @@ def listed(entries: Sequence[Entry], width: int) -> Iterator[Text]:
         else:
             exact = claim.is_exact or not claim.runs
             interval = "" if exact else f"{percent(claim.low)[:-2]} to {percent(claim.high)[:-2]}"
-            figures = f" {CLAIM.get(claim.verdict, '?')}{f'{claim.shown}/{claim.runs}':>7} {interval:>10}"
+            figures = (
+                f" {CLAIM.get(claim.verdict, '?')}{f'{claim.shown}/{claim.runs}':>7} {interval:>10}"
+            )
             text = Text(f"{one.letter:<3}", "bold", no_wrap=True)
             text.append(f"{padded(names[one.name], _name(width))}{figures}", "not bold")
         yield text
@@ -141,8 +182,14 @@ def said(one: Entry, lacks: Sequence[str]) -> Text:
 def head_of(state: RunState, works: bool) -> str:
     """How far the search for the nearest world that passes is, if one has begun, and how often f shows in what is left."""
     certificate = current(state)
-    title = "Why it fails" if state.isolating is None else isolating(state) + ("" if works else " (stopped)")
-    return title if certificate is None else f"{title} · what is left: {rate(certificate.claims[0])}"
+    title = (
+        "Why it fails"
+        if state.isolating is None
+        else isolating(state) + ("" if works else " (stopped)")
+    )
+    return (
+        title if certificate is None else f"{title} · what is left: {rate(certificate.claims[0])}"
+    )
 
 
 def nothing_yet(state: RunState, works: bool, run: str) -> str:

@@ -33,7 +33,16 @@ from ddenv.workbench.playback.playback_screen import Playback, way_of, without
 from ddenv.workbench.shared.background import call_if_open, refuse
 from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 from ddenv.workbench.shared.observed import Observed
-from ddenv.workbench.why.entries import Entry, entries, head, head_of, listed, nothing_yet, remedy, said
+from ddenv.workbench.why.entries import (
+    Entry,
+    entries,
+    head,
+    head_of,
+    listed,
+    nothing_yet,
+    remedy,
+    said,
+)
 
 SMALLEST = (64, 18)
 # Time between two looks at the run, s.
@@ -59,7 +68,11 @@ class WhyScreen(Screen[None]):
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low")]
     AUTO_FOCUS = "#why-list"
     BINDINGS: ClassVar = [
-        *keys("why", ("play", "enter", "play", "play both runs", "play both runs over each other"), priority=True),
+        *keys(
+            "why",
+            ("play", "enter", "play", "play both runs", "play both runs over each other"),
+            priority=True,
+        ),
         *keys(
             "why",
             (
@@ -69,8 +82,20 @@ class WhyScreen(Screen[None]):
                 BEGIN,
                 "find a nearest world in which the robot reaches its goal; again: stop that",
             ),
-            ("margins", "m", "margins", "margins", "how far each number can change before f disappears"),
-            ("copy", "c", "copy", "copy", "copy all sentences, or the command that is named (OSC 52)"),
+            (
+                "margins",
+                "m",
+                "margins",
+                "margins",
+                "how far each number can change before f disappears",
+            ),
+            (
+                "copy",
+                "c",
+                "copy",
+                "copy",
+                "copy all sentences, or the command that is named (OSC 52)",
+            ),
             *MAP_KEYS,
             ("signs", "k", "app.signs", "signs", "what the signs and letters on the map mean"),
             HELP,
@@ -105,7 +130,10 @@ class WhyScreen(Screen[None]):
                 with Framed("Without each model", id="why-models", classes="panel"):
                     yield Static("", id="why-head", markup=False)
                     yield OptionList(id="why-list", compact=True, markup=False)
-                with Framed("What happens", id="why-happens", classes="panel"), VerticalScroll(id="why-scroll"):
+                with (
+                    Framed("What happens", id="why-happens", classes="panel"),
+                    VerticalScroll(id="why-scroll"),
+                ):
                     yield Static("", id="why-said", markup=False)
             with Framed("World", id="why-world", classes="panel"):
                 yield self.map
@@ -149,7 +177,14 @@ class WhyScreen(Screen[None]):
         # Margins are shown once their search is over.
         margins = state.margins if state.margining is None else None
         known = current(state) is not None or state.isolated is not None or margins is not None
-        seen = current(state), state.isolated, margins, works, state.status, 0 if known else state.tests_done
+        seen = (
+            current(state),
+            state.isolated,
+            margins,
+            works,
+            state.status,
+            0 if known else state.tests_done,
+        )
         if seen == self._seen:
             return
         self._seen = seen
@@ -176,8 +211,12 @@ class WhyScreen(Screen[None]):
         self._entries = found
         self.set_class(not found, "-empty")
         if not found:
-            words = trouble or nothing_yet(self._state, self._engine()[0], attach_name(self._file.path))
-            self.query_one("#why-empty", Static).update(Text("\n".join(map(plain, words.split("\n")))))
+            words = trouble or nothing_yet(
+                self._state, self._engine()[0], attach_name(self._file.path)
+            )
+            self.query_one("#why-empty", Static).update(
+                Text("\n".join(map(plain, words.split("\n"))))
+            )
             return
         beyond = f" · {more} more are not listed" if more else ""
         numbers = "; other numbers" if found[-1].figures else ""
@@ -213,7 +252,11 @@ class WhyScreen(Screen[None]):
         apart = (one.letter.lower(), "left out in one") if one.gone else None
         self.map.show_limits(one.limits)
         self.map.show_ways(ways, parting, apart, self._place.prints)
-        title = "World" if one.parting is None or not ways else f"The two paths, seed {one.parting.seed}"
+        title = (
+            "World"
+            if one.parting is None or not ways
+            else f"The two paths, seed {one.parting.seed}"
+        )
         self.query_one("#why-world").border_title = Text(title)
         self.query_one(MapLines).show(self.map.shown)
 
@@ -227,22 +270,31 @@ class WhyScreen(Screen[None]):
         except UserError as error:
             return (), (str(error),)
         lacks = dict.fromkeys(line for each in found for line in each.lacks)
-        ways = tuple(way_of(each, name) for each, name in zip(found, one.ways, strict=True) if each.rows)
+        ways = tuple(
+            way_of(each, name) for each, name in zip(found, one.ways, strict=True) if each.rows
+        )
         return (ways if len(ways) == 2 else ()), tuple(lacks)
 
     def action_play(self) -> None:
         one = self.entry
         if one is None or one.parting is None:
-            refuse(self, "there are no two runs to play: none that share a seed and end differently are stored")
+            refuse(
+                self,
+                "there are no two runs to play: none that share a seed and end differently are stored",
+            )
             return
         try:
             both = one.parting.with_test, one.parting.without_test
-            self.app.push_screen(Playback(self._file, self._position, self._place, *both, one.limits))
+            self.app.push_screen(
+                Playback(self._file, self._position, self._place, *both, one.limits)
+            )
         except UserError as error:
             refuse(self, str(error))
 
     def action_isolate(self) -> None:
-        self._ask(Stop() if self._engine()[0] and self._position.now.isolating is not None else Isolate())
+        self._ask(
+            Stop() if self._engine()[0] and self._position.now.isolating is not None else Isolate()
+        )
 
     def action_margins(self) -> None:
         self.app.push_screen(MarginsDialog(self._position.now, attach_name(self._file.path)))
@@ -260,7 +312,9 @@ class WhyScreen(Screen[None]):
 class MarginsDialog(Reading):
     """The margins that `state` has. `run` is what a shell calls the run."""
 
-    BINDINGS: ClassVar = keys("margins", ("close", "escape,m,q,enter", "dismiss", "close", "close this dialog"))
+    BINDINGS: ClassVar = keys(
+        "margins", ("close", "escape,m,q,enter", "dismiss", "close", "close this dialog")
+    )
 
     def __init__(self, state: RunState, run: str) -> None:
         known = state.margins
@@ -271,7 +325,9 @@ class MarginsDialog(Reading):
         lines = []
         for one in found:
             name, now, until, goal, runs = map(plain, one.cells)
-            words = f"now {now}; f until {until};{'' if goal == '-' else f' then {goal};'} {runs} runs"
+            words = (
+                f"now {now}; f until {until};{'' if goal == '-' else f' then {goal};'} {runs} runs"
+            )
             lines += [(shortened(name, 24), bar(one.margin, 41)), ("", words)]
         means = [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)]
         title = "How far each number can change before f disappears"

@@ -14,7 +14,14 @@ class PathEntry(Input):
     """Where there is nothing to complete, tab goes on to the next field."""
 
     BINDINGS: ClassVar = [
-        Binding("tab", "complete", "complete", id="path.complete", tooltip="complete the path", show=False)
+        Binding(
+            "tab",
+            "complete",
+            "complete",
+            id="path.complete",
+            tooltip="complete the path",
+            show=False,
+        )
     ]
 
     def __init__(self, value: str = "", *, id: str, placeholder: str = "") -> None:
@@ -37,7 +44,8 @@ def completed(text: str) -> str:
         names = sorted(
             f"{each.name}/" if each.is_dir() else each.name
             for each in place.iterdir()
-            if each.name.startswith(begin) and (begin.startswith(".") or not each.name.startswith("."))
+            if each.name.startswith(begin)
+            and (begin.startswith(".") or not each.name.startswith("."))
         )
     except (OSError, ValueError, RuntimeError):
         return text

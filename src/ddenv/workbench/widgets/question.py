@@ -80,7 +80,9 @@ def ask(app: App[Any], text: str, then: Callable[[], object]) -> None:
     app.push_screen(Question(text), answered)
 
 
-def once_trusted(app: App[Any], scenario: Scenario, where: Path, then: Callable[[bool], None]) -> None:
+def once_trusted(
+    app: App[Any], scenario: Scenario, where: Path, then: Callable[[bool], None]
+) -> None:
     """Calls `then` with whether the user trusts what `scenario` (of the file `where`) starts; asks only where that is not known."""
     from ddenv.runs.trust import trust, untrusted
 
@@ -94,4 +96,6 @@ def once_trusted(app: App[Any], scenario: Scenario, where: Path, then: Callable[
             trust(program)
         then(answer == "yes")
 
-    app.push_screen(Question(plain(f"{where} starts {program.words}. Do you trust it?"), final=True), answered)
+    app.push_screen(
+        Question(plain(f"{where} starts {program.words}. Do you trust it?"), final=True), answered
+    )

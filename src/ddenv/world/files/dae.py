@@ -78,7 +78,9 @@ class _Document:
 
     def named(self, tag: str, url: str | None) -> Element | None:
         """The element `tag` that `url` names in this file; other files are not opened."""
-        return self.known.get((tag, url[1:])) if url and url.startswith("#") and url != "#" else None
+        return (
+            self.known.get((tag, url[1:])) if url and url.startswith("#") and url != "#" else None
+        )
 
     def target(self, instance: Element) -> Element | None:
         """The element that an instance places. Skinned shapes keep their original pose."""
@@ -93,7 +95,9 @@ class _Document:
         if element not in weights:
             target = self.target(element)
             parts = [*element, *([] if target is None else [target])]
-            weights[element] = 1000 + len(element.text or "") + sum(self.weight(each, weights) for each in parts)
+            weights[element] = (
+                1000 + len(element.text or "") + sum(self.weight(each, weights) for each in parts)
+            )
         return weights[element]
 
     def placed(self, node: Element, outer: np.ndarray, name: str) -> Iterator[Part]:
@@ -116,7 +120,9 @@ class _Document:
         """The primitives of a geometry that have faces, in the file's unit and without names. Raises ValueError."""
         if geometry not in self.geometries:
             parts = self.geometries[geometry] = []
-            for primitive in (each for mesh in geometry.findall("mesh") for each in mesh if each.tag in PRIMITIVES):
+            for primitive in (
+                each for mesh in geometry.findall("mesh") for each in mesh if each.tag in PRIMITIVES
+            ):
                 corners, counts = _polygons(primitive)
                 faces = _triangles(counts, strips=primitive.tag == "tristrips")
                 if len(faces):
@@ -131,7 +137,10 @@ class _Document:
         source = None if position is None else self.named("source", position.get("source"))
         if source is None:
             raise ValueError(f"<{primitive.tag}> has no vertices")
-        if any((each.get("stride", "3"), each.get("offset", "0")) != ("3", "0") for each in source.iter("accessor")):
+        if any(
+            (each.get("stride", "3"), each.get("offset", "0")) != ("3", "0")
+            for each in source.iter("accessor")
+        ):
             raise ValueError("its positions are stored with gaps; save it without them")
         if source not in self.positions:
             values = _numbers(source.find("float_array"))
@@ -167,7 +176,9 @@ def _polygons(primitive: Element) -> tuple[np.ndarray, np.ndarray]:
     else:
         counts = np.array([len(path) // width for path in paths])
     # Sums of huge numbers would overflow.
-    if len(counts) and (counts.min() < 0 or counts.max() > len(corners) or counts.sum() > len(corners)):
+    if len(counts) and (
+        counts.min() < 0 or counts.max() > len(corners) or counts.sum() > len(corners)
+    ):
         raise ValueError("<vcount> does not match <p>")
     return corners, counts
 

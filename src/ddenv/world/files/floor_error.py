@@ -57,7 +57,9 @@ def _error(model: str, pieces: list[tuple[Piece, Collision]]) -> FloorError:
     """The error of the mesh that is cut into `pieces`; its floor is 0 if it lies above or below a robot."""
     piece, first = pieces[0]
     truth = _of_mesh(piece.mesh, first.pose @ piece.pose.inverse())
-    solids = (Manifold.hull_points(_placed(vertices_of(one.shape, 0)[0], one.pose)) for _, one in pieces)
+    solids = (
+        Manifold.hull_points(_placed(vertices_of(one.shape, 0)[0], one.pose)) for _, one in pieces
+    )
     taken = union(_at_height(solid) for solid in solids)
     floor = (truth + taken).hull().area()
     blocked = max((taken - truth).area(), 0.0)
@@ -98,7 +100,9 @@ def _of_mesh(mesh: Mesh, place: Pose) -> CrossSection:
 
 def _triangles(part: trimesh.Trimesh) -> list[CrossSection]:
     above = slice_faces_plane(part.vertices, part.faces, np.array(UP), np.array([0.0, 0.0, LOW]))
-    vertices, faces, _ = slice_faces_plane(above[0], above[1], np.array(DOWN), np.array([0.0, 0.0, HIGH]))
+    vertices, faces, _ = slice_faces_plane(
+        above[0], above[1], np.array(DOWN), np.array([0.0, 0.0, HIGH])
+    )
     return [CrossSection([corners], FillRule.EvenOdd) for corners in vertices[faces][:, :, :2]]
 
 

@@ -37,7 +37,9 @@ class FuelModel:
     def url(self) -> str:
         """Its address, as `gz fuel download -u` takes it."""
         version = f"/{self.version}" if self.version else ""
-        return f"https://{HOSTS[0]}/1.0/{quoted(self.owner)}/{self.kind}/{quoted(self.name)}{version}"
+        return (
+            f"https://{HOSTS[0]}/1.0/{quoted(self.owner)}/{self.kind}/{quoted(self.name)}{version}"
+        )
 
     @property
     def folder(self) -> Path:

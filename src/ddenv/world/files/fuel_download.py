@@ -49,7 +49,15 @@ VERSION = "X-Ign-Resource-Version"
 # Beside the model's own files: what was downloaded.
 RECORD = "ddenv-fetched.json"
 # How the standard library says that a zip file cannot be unpacked.
-DAMAGED = (zipfile.BadZipFile, zlib.error, LZMAError, EOFError, NotImplementedError, RuntimeError, ValueError)
+DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    LZMAError,
+    EOFError,
+    NotImplementedError,
+    RuntimeError,
+    ValueError,
+)
 
 # Gets the bytes that have come so far, and how many will, if the server says it.
 Shown = Callable[[int, int | None], None]
@@ -96,10 +104,14 @@ def _receive(model: FuelModel, file: Path, shown: Shown) -> Archive:
     with _opener().open(Request(url, headers={"User-Agent": "ddenv"}), timeout=TIMEOUT) as response:
         version = response.headers.get(VERSION) or model.version
         if not re.fullmatch("[1-9][0-9]{0,8}", version) or model.version not in ("", version):
-            raise Unusable(f"the server sent version '{version[:20]}' in place of {model.version or 'the newest one'}")
+            raise Unusable(
+                f"the server sent version '{version[:20]}' in place of {model.version or 'the newest one'}"
+            )
         digest = _copy(response, file, shown)
         if not zipfile.is_zipfile(file):
-            raise Unusable(f"the server sent {response.headers.get_content_type()[:40]}, which is no zip file")
+            raise Unusable(
+                f"the server sent {response.headers.get_content_type()[:40]}, which is no zip file"
+            )
     return Archive(url, version, file.stat().st_size, digest)
 
 
@@ -150,9 +162,16 @@ def _unpack(file: Path, folder: Path) -> None:
         with zipfile.ZipFile(file) as zipped:
             entries = zipped.infolist()
             if len(entries) > MOST_FILES or sum(entry.file_size for entry in entries) > FILES_LIMIT:
-                raise Unusable(f"has more than {MOST_FILES} files or {FILES_LIMIT / 1e6:.0f} MB, the maximum")
-            if not any(entry.filename == "model.config" or entry.filename.endswith(SDF_ENDINGS) for entry in entries):
-                raise Unusable("the zip file that the server sent holds neither model.config nor an SDF file")
+                raise Unusable(
+                    f"has more than {MOST_FILES} files or {FILES_LIMIT / 1e6:.0f} MB, the maximum"
+                )
+            if not any(
+                entry.filename == "model.config" or entry.filename.endswith(SDF_ENDINGS)
+                for entry in entries
+            ):
+                raise Unusable(
+                    "the zip file that the server sent holds neither model.config nor an SDF file"
+                )
             for entry in filter(_leads_out, entries):
                 what = f"'{entry.filename[:80]}', which leads out of its folder"
                 raise Unusable(f"the zip file that the server sent holds {what}")
@@ -170,7 +189,11 @@ def _leads_out(entry: zipfile.ZipInfo) -> bool:
 
 def _reason(error: OSError | HTTPException) -> str:
     if isinstance(error, HTTPError):
-        return "is not in Fuel" if error.code == 404 else f"the server answered {error.code} {error.reason}"
+        return (
+            "is not in Fuel"
+            if error.code == 404
+            else f"the server answered {error.code} {error.reason}"
+        )
     cause = error.reason if isinstance(error, URLError) else error
     if isinstance(cause, TimeoutError):
         return f"the server sent nothing for {TIMEOUT:g} s"

@@ -44,15 +44,25 @@ def read_gltf(data: bytes, folder: Path, limit: int) -> list[Part]:
     text = json.dumps(_shape(header, limit), allow_nan=False).encode()
     if is_binary:
         text = data[:12] + len(text).to_bytes(4, "little") + data[16:20] + text + data[end:]
-    uris = {each["uri"] for each in header["buffers"] if "base64," not in each.get("uri", "base64,")}
+    uris = {
+        each["uri"] for each in header["buffers"] if "base64," not in each.get("uri", "base64,")
+    }
     buffers = {uri: _buffer(uri, folder, limit) for uri in uris}
-    scene = trimesh.load_scene(BytesIO(text), "glb" if is_binary else "gltf", resolver=buffers, process=False)
+    scene = trimesh.load_scene(
+        BytesIO(text), "glb" if is_binary else "gltf", resolver=buffers, process=False
+    )
     # trimesh appends random letters to the names of nodes with several primitives.
     placed = [(int(mesh.metadata["node"].partition("_")[0]), mesh) for mesh in scene.dump()]
     nodes = header["nodes"]
     meshes = header["meshes"]
     return parts_of(
-        ((str(nodes[number].get("name", "")), str(meshes[nodes[number]["mesh"]].get("name", ""))), mesh)
+        (
+            (
+                str(nodes[number].get("name", "")),
+                str(meshes[nodes[number]["mesh"]].get("name", "")),
+            ),
+            mesh,
+        )
         for number, mesh in sorted(placed, key=lambda pair: pair[0])
     )
 
@@ -90,7 +100,10 @@ def _shape(header: Data, limit: int) -> Data:
         if len(primitives) > MOST_PARTS:
             raise ValueError(f"has more than {MOST_PARTS} parts")
     used = {
-        number for mesh in meshes for each in mesh for number in (*each["attributes"].values(), each.get("indices"))
+        number
+        for mesh in meshes
+        for each in mesh
+        for number in (*each["attributes"].values(), each.get("indices"))
     }
     # A node without the mesh if that has no triangles: trimesh would lose the transform for all nodes below.
     placing = [
@@ -104,7 +117,9 @@ def _shape(header: Data, limit: int) -> Data:
         "scenes": [{"nodes": _roots(header)}],
         "nodes": placing,
         "meshes": [{"primitives": mesh} for mesh in meshes],
-        "accessors": [each if number in used else _NOTHING for number, each in enumerate(accessors)],
+        "accessors": [
+            each if number in used else _NOTHING for number, each in enumerate(accessors)
+        ],
         "bufferViews": views,
         "buffers": header["buffers"],
     }
@@ -120,7 +135,10 @@ def _primitives(mesh: Data, accessors: list[Data]) -> Iterator[Data]:
         if mode not in (_TRIANGLES, _STRIP) or position is None:
             continue
         indices = {"indices": primitive["indices"]} if "indices" in primitive else {}
-        for number, (kind, codes) in ((position, _POSITIONS), *((number, _INDICES) for number in indices.values())):
+        for number, (kind, codes) in (
+            (position, _POSITIONS),
+            *((number, _INDICES) for number in indices.values()),
+        ):
             accessor = accessors[number]
             plain = "bufferView" in accessor and "sparse" not in accessor
             if not plain or accessor["type"] != kind or accessor["componentType"] not in codes:
@@ -142,6 +160,10 @@ def _roots(header: Data) -> list[int]:
     roots: list[int] = header["scenes"][header.get("scene", 0)]["nodes"]
     listed = [*roots, *(child for node in nodes for child in node.get("children", []))]
     # glTF requires trees; trimesh would keep one parent of a node with two.
-    if len(set(listed)) < len(listed) or not set(listed) <= {*range(len(nodes))} or len(nodes) > MOST_PARTS:
+    if (
+        len(set(listed)) < len(listed)
+        or not set(listed) <= {*range(len(nodes))}
+        or len(nodes) > MOST_PARTS
+    ):
         raise ValueError("its nodes do not form a tree")
     return roots

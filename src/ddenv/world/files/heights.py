@@ -55,7 +55,9 @@ def pack_heights(shares: Floats) -> bytes:
 def _check_size(columns: int, rows: int) -> None:
     """Raises Unusable."""
     if not 2 <= min(rows, columns) <= max(rows, columns) <= MOST_PIXELS:
-        raise Unusable(f"has {columns} x {rows} pixels; a heightmap has 2 to {MOST_PIXELS} along each side")
+        raise Unusable(
+            f"has {columns} x {rows} pixels; a heightmap has 2 to {MOST_PIXELS} along each side"
+        )
 
 
 def unpack_heights(packed: bytes) -> Floats:

@@ -24,7 +24,11 @@ RULES = 1
 def kept_file(vertices: Floats, faces: Integers, most: int) -> Path:
     """Where the pieces of a mesh, at most `most`, are kept: in `$DDENV_HOME/cache`, or in the user's cache folder."""
     home = os.environ.get("DDENV_HOME")
-    folder = Path(home) / "cache" if home else Path(platformdirs.user_cache_dir("ddenv", appauthor=False))
+    folder = (
+        Path(home) / "cache"
+        if home
+        else Path(platformdirs.user_cache_dir("ddenv", appauthor=False))
+    )
     digest = hashlib.blake2b(digest_size=16)
     digest.update(f"{RULES} {version('manifold3d')} {most} {len(vertices)} ".encode())
     digest.update(vertices.astype("<f8").tobytes())

@@ -44,7 +44,9 @@ def read_parts(path: Path) -> list[Part]:
     """The named parts of a mesh file, as triangles. Raises Unusable, with a reason in one line."""
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise Unusable(f"meshes of type '{suffix[:20]}' are not supported; use one of {', '.join(SUFFIXES)}")
+        raise Unusable(
+            f"meshes of type '{suffix[:20]}' are not supported; use one of {', '.join(SUFFIXES)}"
+        )
     data = read(path, MESH_LIMIT)
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     try:
@@ -72,7 +74,9 @@ def _line(text: str) -> str:
     return truncated(" ".join(text.split()), 200)
 
 
-def build(parts: list[Part], submesh: str = "", center: bool = False, convex: bool = False) -> bytes:
+def build(
+    parts: list[Part], submesh: str = "", center: bool = False, convex: bool = False
+) -> bytes:
     """The mesh of all `parts`, or of those called `submesh`, packed.
 
     It is centred as by `surface_of`. A `convex` mesh, and one of more than `MOST_DRAWN` faces, is replaced by its hull.
@@ -125,7 +129,9 @@ def pack(vertices: np.ndarray, faces: np.ndarray, *, simplified: bool = False) -
     """Header, vertices and faces as little-endian bytes; vertices in 32 bits if that loses no precision, as for most files."""
     short = vertices.astype("<f4")
     kept = short if np.array_equal(short.astype("<f8"), vertices) else vertices.astype("<f8")
-    header = _HEADER.pack(_MAGIC_HULL if simplified else _MAGIC, kept.itemsize, len(vertices), len(faces))
+    header = _HEADER.pack(
+        _MAGIC_HULL if simplified else _MAGIC, kept.itemsize, len(vertices), len(faces)
+    )
     return header + kept.tobytes() + faces.astype("<u4").tobytes()
 
 
@@ -139,7 +145,11 @@ def unpack(name: str, packed: bytes) -> Mesh:
     start = _HEADER.size + 3 * size * count
     if size not in (4, 8) or len(packed) != start + 12 * triangles:
         raise Unusable("its stored mesh is damaged")
-    vertices = np.frombuffer(packed, f"<f{size}", 3 * count, _HEADER.size).reshape(-1, 3).astype(np.float64)
+    vertices = (
+        np.frombuffer(packed, f"<f{size}", 3 * count, _HEADER.size)
+        .reshape(-1, 3)
+        .astype(np.float64)
+    )
     faces = np.frombuffer(packed, "<u4", 3 * triangles, start).reshape(-1, 3).astype(np.uint32)
     try:
         _check(vertices, faces)
@@ -159,7 +169,9 @@ def pack_pieces(pieces: list[Surface]) -> bytes:
 
 def unpack_pieces(name: str, packed: bytes) -> list[Mesh]:
     """The packed pieces, each as `unpack` gives it. Raises Unusable for damaged bytes."""
-    sizes = [size for (size,) in _COUNT.iter_unpack(packed[: len(packed) // _COUNT.size * _COUNT.size])]
+    sizes = [
+        size for (size,) in _COUNT.iter_unpack(packed[: len(packed) // _COUNT.size * _COUNT.size])
+    ]
     if not sizes or sizes[0] >= len(sizes):
         raise Unusable("its stored mesh is damaged")
     start = _COUNT.size * (1 + sizes[0])
@@ -273,7 +285,9 @@ def _thin_axes(points: np.ndarray, limit: float) -> list[np.ndarray]:
 
 def _along(points: np.ndarray, direction: np.ndarray | Vector) -> np.ndarray:
     # Without BLAS, whose sums may differ between machines.
-    return np.asarray(points[:, 0] * direction[0] + points[:, 1] * direction[1] + points[:, 2] * direction[2])
+    return np.asarray(
+        points[:, 0] * direction[0] + points[:, 1] * direction[1] + points[:, 2] * direction[2]
+    )
 
 
 def _length(offsets: np.ndarray) -> np.ndarray:

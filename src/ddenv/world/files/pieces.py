@@ -119,7 +119,9 @@ def solid_of(part: trimesh.Trimesh) -> Manifold | None:
         return None
     if volume(Mesh("part", part.vertices, faces)) < 0:
         faces = faces[:, ::-1]
-    solid = Manifold(Mesh64(np.ascontiguousarray(part.vertices), np.ascontiguousarray(faces, dtype=np.uint64)))
+    solid = Manifold(
+        Mesh64(np.ascontiguousarray(part.vertices), np.ascontiguousarray(faces, dtype=np.uint64))
+    )
     return solid if solid.volume() > SMALLEST else None
 
 
@@ -135,7 +137,9 @@ def _wound_alike(part: trimesh.Trimesh) -> Integers:
     first, second = part.face_adjacency.T
     edges = part.face_adjacency_edges
     alike = _runs_along(part.faces[first], edges) == _runs_along(part.faces[second], edges)
-    neighbours = coo_matrix((np.where(alike, 2, 1), (first, second)), shape=(len(part.faces), len(part.faces))).tocsr()
+    neighbours = coo_matrix(
+        (np.where(alike, 2, 1), (first, second)), shape=(len(part.faces), len(part.faces))
+    ).tocsr()
     neighbours = neighbours + neighbours.T
     order, before = breadth_first_order(neighbours, 0)
     turned = np.zeros(len(part.faces), dtype=bool)
@@ -164,7 +168,9 @@ def _plates(part: trimesh.Trimesh) -> Iterator[Manifold]:
         normal = part.face_normals[area[0]]
         to_plane: Floats = trimesh.geometry.plane_transform(part.triangles[area[0], 0], normal)
         flat = trimesh.transform_points(part.triangles[area].reshape(-1, 3), to_plane)[:, :2]
-        outline = union(CrossSection([corners], FillRule.NonZero) for corners in flat.reshape(-1, 3, 2))
+        outline = union(
+            CrossSection([corners], FillRule.NonZero) for corners in flat.reshape(-1, 3, 2)
+        )
         plate = outline.extrude(PLATE).translate((0.0, 0.0, -PLATE))
         yield plate.transform(np.linalg.inv(to_plane)[:3])
 
@@ -247,7 +253,9 @@ def _planes(solid: Manifold) -> list[Plane]:
     return [(normals[edge], float(heights[edge] + BEYOND * size)) for edge in longest]
 
 
-def _concave_edges(vertices: Floats, faces: Integers, least: float) -> tuple[Floats, Floats, Floats]:
+def _concave_edges(
+    vertices: Floats, faces: Integers, least: float
+) -> tuple[Floats, Floats, Floats]:
     """The edges of a closed surface at which a face rises more than `least` (m) above the plane of its neighbour.
 
     For each, and from either side: the neighbour's unit normal (N, 3), a point of the edge (N, 3) m, and its length (N,) m.

@@ -20,8 +20,26 @@ import numpy as np
 
 from ddenv.arrays import Floats
 from ddenv.text import first_of
-from ddenv.world.access import Missing, Unusable, folders_of, is_file, is_folder, read, reason, xml_root
-from ddenv.world.files.fuel import GAZEBO, FuelModel, cached, caches, hosts, in_fuel, newest, refuse_link_out
+from ddenv.world.access import (
+    Missing,
+    Unusable,
+    folders_of,
+    is_file,
+    is_folder,
+    read,
+    reason,
+    xml_root,
+)
+from ddenv.world.files.fuel import (
+    GAZEBO,
+    FuelModel,
+    cached,
+    caches,
+    hosts,
+    in_fuel,
+    newest,
+    refuse_link_out,
+)
 from ddenv.world.files.heights import read_heights, unpack_heights
 from ddenv.world.files.meshes import build, read_parts, surface_of, unpack, unpack_pieces
 from ddenv.world.files.roots import absolute, source_of
@@ -60,7 +78,9 @@ class Resources:
     Failures are kept too: a world may name one broken file a thousand times.
     """
 
-    def __init__(self, taken: Mapping[str, bytes], folders: Mapping[Path, str] | None = None) -> None:
+    def __init__(
+        self, taken: Mapping[str, bytes], folders: Mapping[Path, str] | None = None
+    ) -> None:
         self.taken = dict(taken)
         self._reads_disk = folders is not None
         self._folders = folders or {}
@@ -92,8 +112,12 @@ class Resources:
         self.asked[part.uri, part.base] = None
         key = part.key("mesh", convex)
         if key not in self._meshes:
-            packed = self._bytes(key, lambda: build(self._parts(part), part.submesh, part.center, convex))
-            self._meshes[key] = unpack(json.dumps([part.uri, part.submesh, part.center, convex]), packed)
+            packed = self._bytes(
+                key, lambda: build(self._parts(part), part.submesh, part.center, convex)
+            )
+            self._meshes[key] = unpack(
+                json.dumps([part.uri, part.submesh, part.center, convex]), packed
+            )
         return self._meshes[key]
 
     def pieces(self, part: MeshPart, scale: Vector, most: int) -> list[Mesh]:
@@ -107,7 +131,10 @@ class Resources:
     def heights(self, part: MeshPart) -> Floats:
         """The heights (R, C) in an image, as a share of the greatest; the first row has the least y."""
         self.asked[part.uri, part.base] = None
-        return self._unpacked(part.key("heightmap"), lambda: read_heights(self._find(part.uri, part.base, model=False)))
+        return self._unpacked(
+            part.key("heightmap"),
+            lambda: read_heights(self._find(part.uri, part.base, model=False)),
+        )
 
     def ground(self, part: MeshPart, scale: Vector) -> Floats:
         """The heights (R, C) of a mesh that is ground, times `scale`, as a share of those of the box around it."""
@@ -156,7 +183,9 @@ class Resources:
 
     def absent(self) -> tuple[str, ...]:
         """The URIs for which no file was found so far."""
-        missing = [json.loads(key)[1] for key, error in self._failed.items() if isinstance(error, Missing)]
+        missing = [
+            json.loads(key)[1] for key, error in self._failed.items() if isinstance(error, Missing)
+        ]
         return tuple(dict.fromkeys(missing))
 
     def _find(self, uri: str, base: Path, *, model: bool) -> Path:
@@ -259,7 +288,9 @@ def fuel_model(uri: str) -> FuelModel | None:
 def how_to_fetch(uris: Iterable[str]) -> str:
     """What downloads those of the missing `uris` that are in Fuel, as the end of a sentence; empty if none is."""
     models = [model for model in map(fuel_model, uris) if model is not None]
-    commands = [f"gz fuel download -u {url}" for url in dict.fromkeys(model.url for model in models)]
+    commands = [
+        f"gz fuel download -u {url}" for url in dict.fromkeys(model.url for model in models)
+    ]
     if not commands:
         return ""
     what = "this model" if len(commands) == 1 else f"these {len(commands)} models"
@@ -288,7 +319,9 @@ def find(uri: str, base: Path, folders: Collection[Path]) -> Path:
         return _first([Path(os.path.normpath(rest))], "there is no such file")
     around = (base, *folders)
     paths = [Path(os.path.normpath(folder / rest)) for folder in around]
-    staying = [path for path in paths if any(map(absolute(path).is_relative_to, map(absolute, around)))]
+    staying = [
+        path for path in paths if any(map(absolute(path).is_relative_to, map(absolute, around)))
+    ]
     if not staying:
         raise Unusable(CLIMBS)
     return _first(staying, f"looked beside the file that names it and in {_listed(folders)}")
@@ -323,7 +356,9 @@ def _of_model(path: str, folders: Collection[Path]) -> Iterator[Path]:
 def _package(folder: Path) -> str:
     """The name of the ROS package in `folder`; empty if it holds none."""
     try:
-        return (xml_root(read(folder / "package.xml", MODEL_CONFIG_LIMIT)).findtext("name") or "").strip()
+        return (
+            xml_root(read(folder / "package.xml", MODEL_CONFIG_LIMIT)).findtext("name") or ""
+        ).strip()
     except Unusable:
         return ""
 
@@ -418,7 +453,9 @@ def _newest_file(config: Element) -> str:
     newest = (-1, -1)
     for element in config.findall("sdf"):
         # As numbers, since 1.12 is newer than 1.9.
-        match = re.fullmatch(r"\s*(\d{1,4})(?:\.(\d{1,4}))?(?:\.\d{1,4})*\s*", element.get("version", ""))
+        match = re.fullmatch(
+            r"\s*(\d{1,4})(?:\.(\d{1,4}))?(?:\.\d{1,4})*\s*", element.get("version", "")
+        )
         version = (0, 0) if match is None else (int(match[1]), int(match[2] or 0))
         own = (element.text or "").strip()
         if own and newest < version <= NEWEST_SDF:

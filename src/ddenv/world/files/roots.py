@@ -46,7 +46,11 @@ def around(world_folder: Path) -> list[tuple[Path, str]]:
     # The nearest folder of worlds, if the world is in one.
     packages = [each.parent for each in (folder, *folder.parents) if each.name == WORLDS]
     beside = [(package / MODELS, f"{MODELS} beside {WORLDS}") for package in packages[:1]]
-    return [(folder, "the world's folder"), (folder / MODELS, f"{MODELS} in the world's folder"), *beside]
+    return [
+        (folder, "the world's folder"),
+        (folder / MODELS, f"{MODELS} in the world's folder"),
+        *beside,
+    ]
 
 
 def _listed_in(place: str) -> list[Path]:

@@ -29,7 +29,10 @@ def surface_heights(surface: Surface) -> bytes:
     low = vertices.min(axis=0)
     size = np.ptp(vertices, axis=0)
     corners = vertices[faces]
-    covered = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]).sum() / 2
+    covered = (
+        np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]).sum()
+        / 2
+    )
     uneven = abs(covered / max(size[0] * size[1], 1e-12) - 1) > GAPS
     if uneven or size[:2].min() < LARGE or size[2] < LEVEL or len(faces) < FINE:
         raise Unusable("is no ground")

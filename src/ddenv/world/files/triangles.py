@@ -53,7 +53,9 @@ def chosen(parts: Sequence[Part], name: str) -> list[Part]:
             return found
     known = list(dict.fromkeys(part.names[0] for part in parts if part.names and part.names[0]))
     listed = ", ".join(f"'{each[:60]}'" for each in known[:5]) or "none with a name"
-    raise ValueError(f"has no submesh '{name[:60]}'; it has {listed}{', ...' if len(known) > 5 else ''}")
+    raise ValueError(
+        f"has no submesh '{name[:60]}'; it has {listed}{', ...' if len(known) > 5 else ''}"
+    )
 
 
 def joined(parts: Sequence[Part]) -> tuple[np.ndarray, np.ndarray]:
@@ -85,16 +87,25 @@ def read_obj(data: bytes) -> list[Part]:
     objects: dict[tuple[str, ...], list[tuple[int, int, int]]] = {}
     name = ""
     group = ""
-    for line in data.decode("utf-8", errors="replace").replace("\\\r\n", " ").replace("\\\n", " ").splitlines():
+    for line in (
+        data.decode("utf-8", errors="replace")
+        .replace("\\\r\n", " ")
+        .replace("\\\n", " ")
+        .splitlines()
+    ):
         word, *rest = line.partition("#")[0].split() or [""]
         if word == "v":
             vertices.append(rest[:3])
         elif word == "f" and len(rest) > 2:
             numbers = [int(corner.partition("/")[0]) for corner in rest]
             # Negative numbers count back from the last vertex before the face.
-            first, *others = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
+            first, *others = [
+                number - 1 if number > 0 else len(vertices) + number for number in numbers
+            ]
             if 0 in numbers or min(first, *others) < 0:
-                raise ValueError(f"a face refers to the vertex {min(numbers)}, which does not exist")
+                raise ValueError(
+                    f"a face refers to the vertex {min(numbers)}, which does not exist"
+                )
             # Without objects, groups serve as objects.
             faces = objects.setdefault((name, group) if name else (group,), [])
             faces += [(first, second, third) for second, third in pairwise(others)]

@@ -48,7 +48,9 @@ def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context
     is_empty = not builder.links
     if is_empty:
         context.note("ignored", part.element, "it has no <link>: nothing can touch it")
-        builder.links.append(Link(name="link", pose=actual, inertia=None, collisions=(), visuals=()))
+        builder.links.append(
+            Link(name="link", pose=actual, inertia=None, collisions=(), visuals=())
+        )
     if entry is not None:
         _note_move(list(builder.poses.values()), saved, context)
     pulled = [truth(link, "gravity", True) for link in builder.elements]
@@ -71,7 +73,9 @@ def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context
         light = next(builder.elements[pulled.index(False)].iter("gravity"))
         context.note("ignored", light, "gravity acts on all links of a model or on none")
     if any(builder.self_collide) and not all(builder.self_collide):
-        context.note("replaced", part.element, "self-collision of some links by self-collision of all links")
+        context.note(
+            "replaced", part.element, "self-collision of some links by self-collision of all links"
+        )
     if not is_ground(model):
         return without_ball_joints(model, part.element, context)
     context.note("replaced", part.element, "static, since ground does not move")
@@ -128,7 +132,9 @@ class _Builder:
         if own == WORLD:
             raise complain(element, "the name 'world' is reserved by SDF; choose another")
         if name in self.poses:
-            raise complain(element, "this link name is used twice; give each link of the model its own name")
+            raise complain(
+                element, "this link name is used twice; give each link of the model its own name"
+            )
         local = spot.scope.place(element)
         there = saved.links.get(own, spot.actual @ local)
         self.poses[name] = LinkPose(spot.nominal @ local, there)
@@ -144,11 +150,30 @@ class _Builder:
         static = spot.static or (_is_static(part) and not part.merged)
         inner = spot.scope.inside(part)
         _check_has_link(part, inner)
-        self.add(Spot(scope=inner, nominal=spot.nominal @ local, actual=there, prefix=prefix, scale=spot.scale, static=static), saved)
+        self.add(
+            Spot(
+                scope=inner,
+                nominal=spot.nominal @ local,
+                actual=there,
+                prefix=prefix,
+                scale=spot.scale,
+                static=static,
+            ),
+            saved,
+        )
         if static and not spot.static:
             # A static model nested in a moving one: its links are welded to the world.
             links = self.links[before:]
-            self.joints += [Joint(name=f"{link.name} (static)", kind="fixed", parent=WORLD, child=link.name, pose=link.pose) for link in links]
+            self.joints += [
+                Joint(
+                    name=f"{link.name} (static)",
+                    kind="fixed",
+                    parent=WORLD,
+                    child=link.name,
+                    pose=link.pose,
+                )
+                for link in links
+            ]
 
 
 def _check_has_link(part: Part, scope: Scope) -> None:
@@ -162,7 +187,9 @@ def _is_static(part: Part) -> bool:
 
 
 def _note_move(poses: list[LinkPose], saved: Saved, context: Context) -> None:
-    farthest = max((math.dist(pose.nominal.position, pose.actual.position) for pose in poses), default=0.0)
+    farthest = max(
+        (math.dist(pose.nominal.position, pose.actual.position) for pose in poses), default=0.0
+    )
     turns = [math.hypot(*(pose.nominal.inverse() @ pose.actual).quaternion[1:]) for pose in poses]
     if farthest > MOVED or max(turns, default=0.0) > MOVED:
         how = f"{farthest:.2f} m away" if farthest > MOVED else "turned"
@@ -197,7 +224,9 @@ def _saved(model: Element, context: Context) -> Saved:
     for velocity in model.findall("link/velocity"):
         if any(abs(part) > STILL for part in floats(velocity)):
             context.note("ignored", velocity, "every run starts at rest")
-    links = {name_of(link): pose for link in model.findall("link") if (pose := _pose(link)) is not None}
+    links = {
+        name_of(link): pose for link in model.findall("link") if (pose := _pose(link)) is not None
+    }
     models = {name_of(inner): _saved(inner, context) for inner in model.findall("model")}
     return Saved(element=model, pose=_pose(model), scale=factors, links=links, models=models)
 

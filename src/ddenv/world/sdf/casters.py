@@ -26,7 +26,9 @@ def without_ball_joints(model: Model, element: Element, context: Context) -> Mod
     for joint in balls.values():
         why = "a ball joint: the sphere of its caster ball is fixed, and slides without friction"
         context.note("replaced", element, why, joint.name)
-    joints = tuple(replace(joint, kind="fixed") if joint.child in balls else joint for joint in model.joints)
+    joints = tuple(
+        replace(joint, kind="fixed") if joint.child in balls else joint for joint in model.joints
+    )
     links = tuple(_slippery(link) if link.name in balls else link for link in model.links)
     return replace(model, joints=joints, links=links)
 

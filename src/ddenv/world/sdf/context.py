@@ -48,7 +48,18 @@ QUIET: dict[str, frozenset[str]] = {
 }
 QUIET["axis2"] = QUIET["axis"]
 QUIET["add_model"] = QUIET["include"]
-ONCE = {"pose", "geometry", "inertial", "surface", "material", "static", "scale", "gravity", "self_collide", "density"}
+ONCE = {
+    "pose",
+    "geometry",
+    "inertial",
+    "surface",
+    "material",
+    "static",
+    "scale",
+    "gravity",
+    "self_collide",
+    "density",
+}
 ONCE |= {"axis", "axis2", "parent", "child", "limit"}
 REASONS = {
     "plugin": "plugins are not run",
@@ -75,7 +86,18 @@ WITHOUT = {
 }
 # Substructures without a reader of their own; a reader notes its element itself.
 INSIDE = frozenset(
-    ["inertial", "inertia", "surface", "friction", "bounce", "axis", "axis2", "limit", "dynamics", "velocity_decay"]
+    [
+        "inertial",
+        "inertia",
+        "surface",
+        "friction",
+        "bounce",
+        "axis",
+        "axis2",
+        "limit",
+        "dynamics",
+        "velocity_decay",
+    ]
 )
 
 
@@ -107,9 +129,20 @@ class Context:
     def __post_init__(self) -> None:
         self.stand_ins = parse_stand_ins(self.reading.stand_ins)
 
-    def note(self, kind: Literal["replaced", "ignored"], element: Element, why: str, detail: str = "") -> None:
+    def note(
+        self, kind: Literal["replaced", "ignored"], element: Element, why: str, detail: str = ""
+    ) -> None:
         """Notes that `element` was replaced or ignored."""
-        self.notes.append(Note(kind=kind, model=self.model, place=place(element), what=f"<{element.tag}>", why=why, detail=detail))
+        self.notes.append(
+            Note(
+                kind=kind,
+                model=self.model,
+                place=place(element),
+                what=f"<{element.tag}>",
+                why=why,
+                detail=detail,
+            )
+        )
 
     def note_tolerance(self, root: Element, text: bytes) -> None:
         """Notes what is no strict XML in `text`, the content of the file of `root`."""
@@ -118,13 +151,21 @@ class Context:
             return
         file = "/".join(root.source.parts[-2:])
         why = f"in {file}, {fault}; the file was read as Gazebo reads it"
-        self.notes.append(Note(kind="ignored", model=self.model, place=place(root), what="a fault of XML", why=why))
+        self.notes.append(
+            Note(
+                kind="ignored", model=self.model, place=place(root), what="a fault of XML", why=why
+            )
+        )
 
     def note_unused(self, root: Element) -> None:
         """Notes the stand-ins that nothing asked for: probably typing errors."""
         # `auto` asks for nothing as long as nothing is missing.
-        for uri in sorted(uri for uri, own in self.stand_ins.items() if own != AUTO and uri not in self.used):
-            self.note("ignored", root, f"the stand-in for '{uri}' is not used: no model or mesh names it")
+        for uri in sorted(
+            uri for uri, own in self.stand_ins.items() if own != AUTO and uri not in self.used
+        ):
+            self.note(
+                "ignored", root, f"the stand-in for '{uri}' is not used: no model or mesh names it"
+            )
 
     def recorded(self, world: World) -> World:
         """`world`, with what was noted, found and guessed as it was read."""
@@ -195,7 +236,11 @@ def first_macro(root: Element) -> Element | None:
     """The first element of xacro: with its usual prefix, or with one that the file gives to its namespace."""
     prefixes = {"xacro"}
     for element in root.iter():
-        prefixes |= {name.removeprefix("xmlns:") for name, value in element.attrib.items() if value.endswith("xacro")}
+        prefixes |= {
+            name.removeprefix("xmlns:")
+            for name, value in element.attrib.items()
+            if value.endswith("xacro")
+        }
         prefix, colon, _ = element.tag.partition(":")
         if colon and prefix in prefixes:
             return element
@@ -204,7 +249,9 @@ def first_macro(root: Element) -> Element | None:
 
 def refuse_xacro(element: Element, expected: str, file: str) -> UserError:
     """The error for macros. They hold Python, which only the user can trust."""
-    advice = f"run 'xacro FILE > {file}' and name that file ('pip install xacro' brings the command)"
+    advice = (
+        f"run 'xacro FILE > {file}' and name that file ('pip install xacro' brings the command)"
+    )
     return complain(element, f"is xacro, not {expected}; {advice}")
 
 
@@ -219,7 +266,9 @@ def version(element: Element) -> tuple[int, int]:
 
 def refuse(element: Element, tag: Ignorable, message: str) -> UserError:
     """The error for an element that is not supported but can be left out with `--ignore`."""
-    return Unsupported(f"{place(element)}: {message}; leave it out with --ignore {tag}", tag, element.source)
+    return Unsupported(
+        f"{place(element)}: {message}; leave it out with --ignore {tag}", tag, element.source
+    )
 
 
 def note_unread(element: Element, context: Context) -> None:

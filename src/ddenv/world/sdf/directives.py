@@ -191,7 +191,9 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: Node | None, index: Any) -> Node | None:
         if self.check_event(yaml.AliasEvent):
             mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise yaml.MarkedYAMLError(problem="aliases (*name) are not read; write the value out", problem_mark=mark)
+            raise yaml.MarkedYAMLError(
+                problem="aliases (*name) are not read; write the value out", problem_mark=mark
+            )
         return super().compose_node(parent, index)
 
 
@@ -209,7 +211,9 @@ def opened(text: bytes, path: Path, context: Context) -> tuple[list[Directive], 
     return found, flat.encode()
 
 
-def _open(source: Source, files: tuple[Path, ...], context: Context, found: list[Directive]) -> list[tuple[Span, str]]:
+def _open(
+    source: Source, files: tuple[Path, ...], context: Context, found: list[Directive]
+) -> list[tuple[Span, str]]:
     """Adds the directives of `source` to `found`; returns what to write in place of each `add_directives` of the outermost file."""
     pieces = []
     try:
@@ -226,7 +230,13 @@ def _open(source: Source, files: tuple[Path, ...], context: Context, found: list
         ((kind, value),) = source.pairs(node).items()
         if kind not in KEYS:
             raise source.complain(node, f"unknown directive '{kind}'{nearest(kind, KEYS)}")
-        one = Directive(kind=kind, keys=source.keys(value, kind, KEYS[kind]), node=node, source=source, span=source.bytes_of((start, end)))
+        one = Directive(
+            kind=kind,
+            keys=source.keys(value, kind, KEYS[kind]),
+            node=node,
+            source=source,
+            span=source.bytes_of((start, end)),
+        )
         if len(found) >= MOST:
             raise source.complain(node, f"more than {MOST} directives")
         found.append(one)
@@ -238,7 +248,12 @@ def _open(source: Source, files: tuple[Path, ...], context: Context, found: list
                 texts = [_flat(each) for each in found[first:] if each.kind != "add_directives"]
                 new_line = "\n" + " " * (start - source.text.rfind("\n", 0, start) - 1)
                 block = new_line.join(f"- {each}" for each in texts)
-                pieces.append(((start, end), "".join(f"{each}, " for each in texts) if listed.flow_style else block))
+                pieces.append(
+                    (
+                        (start, end),
+                        "".join(f"{each}, " for each in texts) if listed.flow_style else block,
+                    )
+                )
     return pieces
 
 
@@ -325,4 +340,6 @@ def _flat(one: Directive) -> str:
             continue
         each.flow_style = True
         left += chain(*each.value) if isinstance(each, MappingNode) else each.value
-    return str(yaml.serialize(node, Dumper=yaml.SafeDumper, width=math.inf, allow_unicode=True)).strip()
+    return str(
+        yaml.serialize(node, Dumper=yaml.SafeDumper, width=math.inf, allow_unicode=True)
+    ).strip()

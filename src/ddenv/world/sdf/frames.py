@@ -27,7 +27,11 @@ class Scope:
     """The frames inside one `<model>` or `<world>`; all poses are relative to its own frame."""
 
     def __init__(
-        self, element: Element, files: tuple[Path, ...], context: Context, scopes: dict[int, Scope] | None = None
+        self,
+        element: Element,
+        files: tuple[Path, ...],
+        context: Context,
+        scopes: dict[int, Scope] | None = None,
     ) -> None:
         self.element = element
         # The models directly inside, in the file's order.
@@ -51,7 +55,10 @@ class Scope:
 
     def is_left_out(self, part: Part) -> bool:
         """Whether nothing is left of one of the `parts`, since all that it includes was left out."""
-        if part.element.find("link") is not None or next(part.element.iter("include"), None) is None:
+        if (
+            part.element.find("link") is not None
+            or next(part.element.iter("include"), None) is None
+        ):
             return False
         inner = self.inside(part)
         return all(inner.is_left_out(each) for each in inner.parts)
@@ -74,7 +81,10 @@ class Scope:
         asked_by = asker
         while not (at in OWN or at in self._poses or (at == WORLD and self.element.tag != "model")):
             if at in chain:
-                raise complain(asker, f"the frames form a cycle: {shown([*list(chain)[list(chain).index(at) :], at])}")
+                raise complain(
+                    asker,
+                    f"the frames form a cycle: {shown([*list(chain)[list(chain).index(at) :], at])}",
+                )
             base, chain[at], asked_by = self._step(at, asked_by)
             at = base
         pose = self._poses.get(at, HERE)
@@ -108,7 +118,9 @@ class Scope:
     def _merged(self, name: str) -> Part | None:
         """The merged model that has something of this name, such as `link` or `inner::link`."""
         first = name.partition("::")[0]
-        return next((part for part in self.parts if part.merged and first in self.inside(part).named), None)
+        return next(
+            (part for part in self.parts if part.merged and first in self.inside(part).named), None
+        )
 
     def place(self, holder: Element, default: str = "") -> Pose:
         """The pose in the `<pose>` of `holder`, which is relative to the frame `default` unless it names one."""
@@ -123,8 +135,16 @@ class Scope:
     def _at(self, base: str, element: Element | None, holder: Element) -> Pose:
         local = HERE if element is None else pose_of(element)
         if element is not None and element.get("frame") and version(element) >= (1, 7):
-            self._context.note("ignored", element, "the attribute 'frame' has no effect since SDF 1.7; use relative_to")
-        return local if base in OWN else self.pose(base, holder if element is None else element) @ local
+            self._context.note(
+                "ignored",
+                element,
+                "the attribute 'frame' has no effect since SDF 1.7; use relative_to",
+            )
+        return (
+            local
+            if base in OWN
+            else self.pose(base, holder if element is None else element) @ local
+        )
 
     def _by_placement_frame(self, part: Part, pose: Pose) -> Pose:
         """The pose of `part`, if `pose` is that of its placement frame."""
@@ -139,7 +159,9 @@ class Scope:
         seen: dict[str, None] = {}
         while name not in OWN:
             if name in seen:
-                raise complain(asker, f"the attachments of frames form a cycle: {shown([*seen, name])}")
+                raise complain(
+                    asker, f"the attachments of frames form a cycle: {shown([*seen, name])}"
+                )
             seen[name] = None
             thing = self.named.get(name)
             first, _, rest = name.partition("::")
@@ -175,7 +197,10 @@ class Scope:
         """The names that poses and frames directly inside this world refer to."""
         frames = self.element.findall("frame")
         named = [_carrier(frame) for frame in frames]
-        named += [_named_in(holder.find("pose")) for holder in (*frames, *(part.at for part in self.parts))]
+        named += [
+            _named_in(holder.find("pose"))
+            for holder in (*frames, *(part.at for part in self.parts))
+        ]
         # A model's name may itself hold colons.
         return {name for each in named for name in (each, each.split("::", 1)[0]) if name}
 
@@ -199,7 +224,9 @@ def pose_of(element: Element) -> Pose:
         return HERE
     form = (element.get("rotation_format") or "euler_rpy").strip()
     if form not in ("euler_rpy", "quat_xyzw"):
-        raise complain(element, f"rotation_format '{form[:40]}' is unknown; use euler_rpy or quat_xyzw")
+        raise complain(
+            element, f"rotation_format '{form[:40]}' is unknown; use euler_rpy or quat_xyzw"
+        )
     if form == "quat_xyzw":
         x, y, z, *turn = numbers(element, 7)
         length = math.hypot(*turn)
@@ -211,7 +238,11 @@ def pose_of(element: Element) -> Pose:
         x, y, z, *angles = numbers(element, 6)
         in_degrees = element.get("degrees", "").strip().lower() in ("1", "true")
         scale = math.pi / 180 if in_degrees else 1.0
-        pose = Pose.from_rpy(x, y, z, *(angle * scale for angle in angles)) if any(angles) else Pose((x, y, z))
+        pose = (
+            Pose.from_rpy(x, y, z, *(angle * scale for angle in angles))
+            if any(angles)
+            else Pose((x, y, z))
+        )
     if max(abs(x), abs(y), abs(z)) > FARTHEST:
         raise TooFar(str(complain(element, f"is farther than {FARTHEST:g} m away")))
     return pose

@@ -24,7 +24,18 @@ from ddenv.world.sdf.xml import Element, complain, number, numbers, text_of, tru
 from ddenv.world.write import primitive
 
 SIDES = 32  # of a cone
-SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline", "heightmap")
+SHAPES = (
+    "box",
+    "cylinder",
+    "sphere",
+    "plane",
+    "capsule",
+    "ellipsoid",
+    "cone",
+    "mesh",
+    "polyline",
+    "heightmap",
+)
 SMALLEST = 1e-6
 LARGEST = 1e6  # m
 # The sizes of each shape, m, by the elements that say them: libsdformat takes these where one is
@@ -92,7 +103,11 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
             seen = parent.tag == "visual"
             if not seen and not context.ignores(tag):
                 return _terrain(element, context, scale)
-            why = f"a {tag} is not drawn" if seen else "left out by --ignore: nothing collides with it"
+            why = (
+                f"a {tag} is not drawn"
+                if seen
+                else "left out by --ignore: nothing collides with it"
+            )
             context.note("ignored", element, why)
             return None
         case "plane":
@@ -133,7 +148,9 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
     factor = element.find("scale")
     own = ONE if factor is None else vector(numbers(factor, 3))
     if factor is not None and (min(map(abs, own)) < 1e-9 or max(map(abs, own)) > LARGEST):
-        raise complain(factor, f"a scale must be from 1e-09 to 1e+06 or negative, found '{text_of(factor)}'")
+        raise complain(
+            factor, f"a scale must be from 1e-09 to 1e+06 or negative, found '{text_of(factor)}'"
+        )
     given = context.stand_in(uri)
     if given is not None:
         text, stand_in = given
@@ -153,9 +170,18 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
         mesh = context.resources.mesh(part, convex=False)
     except (Missing, Unusable) as error:
         word = AUTO if context.may_guess(uri) else ""
-        return Lost(element=element, uri=uri, reason=str(error), word=word, scale=full, unreadable=isinstance(error, Unusable))
+        return Lost(
+            element=element,
+            uri=uri,
+            reason=str(error),
+            word=word,
+            scale=full,
+            unreadable=isinstance(error, Unusable),
+        )
     if mesh.simplified:
-        context.note("replaced", element, f"'{uri}' by its convex hull, since it is too fine to be drawn")
+        context.note(
+            "replaced", element, f"'{uri}' by its convex hull, since it is too fine to be drawn"
+        )
     return Placed(_scaled(mesh, full, element))
 
 
@@ -183,7 +209,9 @@ def _ground(uri: str, shares: Floats, size: Vector, middle: Vector) -> Placed:
     return Placed(Terrain(size[:2], shares * size[2], f"{uri} {digest} {size}"), Pose(middle))
 
 
-def _solid(part: MeshPart, element: Element, parent: Element, context: Context, scale: Vector) -> Placed:
+def _solid(
+    part: MeshPart, element: Element, parent: Element, context: Context, scale: Vector
+) -> Placed:
     """What collides in place of a mesh: its convex pieces, or its hull. Raises Missing, Unusable and UserError."""
     hull = _scaled_mesh(context.resources.mesh(part, convex=True), scale, element)
     most = _most_pieces(element, parent, context)
@@ -195,14 +223,18 @@ def _solid(part: MeshPart, element: Element, parent: Element, context: Context, 
         low = hull.vertices.min(axis=0)
         high = hull.vertices.max(axis=0)
         context.note("replaced", element, f"'{part.uri}' by the solid ground below it")
-        return _ground(part.uri, shares, vector(high - low), vector([*(low + high)[:2] / 2, low[2]]))
+        return _ground(
+            part.uri, shares, vector(high - low), vector([*(low + high)[:2] / 2, low[2]])
+        )
     pieces = context.resources.pieces(part, scale, most) if most > 1 else []
     if len(pieces) == 1 and (box := box_of(hull)) is not None:
         return Placed(*box)
     if len(pieces) < 2:
         context.note("replaced", element, f"'{part.uri}' by its convex hull; {ROUGH}")
         return Placed(hull)
-    context.note("replaced", element, f"'{part.uri}' by its convex pieces; {ROUGH}", f"{len(pieces)} pieces")
+    context.note(
+        "replaced", element, f"'{part.uri}' by its convex pieces; {ROUGH}", f"{len(pieces)} pieces"
+    )
     whole = _scaled_mesh(context.resources.mesh(part, convex=False), scale, element)
     return _of_pieces(whole, pieces)
 
@@ -223,21 +255,34 @@ def _is_turned(collision: Element) -> bool:
     link = collision.parent
     if link is None or link.parent is None:
         return False
-    joints = (joint for joint in link.parent.findall("joint") if joint.get("type") in ("revolute", "continuous"))
+    joints = (
+        joint
+        for joint in link.parent.findall("joint")
+        if joint.get("type") in ("revolute", "continuous")
+    )
     return any(text_of(joint.find("child")) == link.get("name") for joint in joints)
 
 
 def scaled(stand_in: Placed, scale: Vector, element: Element) -> Placed:
     """A stand-in for the mesh `element` in a model of this scale. Raises UserError."""
-    return Placed(_scaled(stand_in.shape, scale, element), Pose(_times(stand_in.offset.position, scale)))
+    return Placed(
+        _scaled(stand_in.shape, scale, element), Pose(_times(stand_in.offset.position, scale))
+    )
 
 
 def remedies(lost: Lost, siblings: Names) -> str:
     """The error for a missing collision mesh, with all remedies; `siblings` are the kinds of other shapes in its link."""
     # For model://barrel/meshes/barrel.dae name the model: one stand-in then covers all of its meshes.
-    package = "/".join(lost.uri.split("/")[:3]) if lost.uri.startswith(("model://", "package://")) else lost.uri
+    package = (
+        "/".join(lost.uri.split("/")[:3])
+        if lost.uri.startswith(("model://", "package://"))
+        else lost.uri
+    )
     others = ", ".join(f"{kind}:{sizes}" for kind, sizes in SIZES.items() if kind != "cylinder")
-    also = "".join(f", or '{lost.uri[:200]}={kind}' for the box around its link's {kind} shapes" for kind in siblings)
+    also = "".join(
+        f", or '{lost.uri[:200]}={kind}' for the box around its link's {kind} shapes"
+        for kind in siblings
+    )
     # Another folder would not help if the file is there.
     folder = "" if lost.unreadable else "its folder with --model-path, "
     return (
@@ -303,17 +348,27 @@ def _polyline(geometry: Element, context: Context, scale: Vector) -> Placed:
     """All `<polyline>`s of a `<geometry>`, extruded upwards from z = 0; what lies in two of them is a hole. Raises UserError."""
     elements = geometry.findall("polyline")
     (height,) = _sizes(elements[0])
-    outlines = [np.array([numbers(point, 2) for point in element.findall("point")]) for element in elements]
+    outlines = [
+        np.array([numbers(point, 2) for point in element.findall("point")]) for element in elements
+    ]
     corners = convex_hull(np.vstack([outline.reshape(-1, 2) for outline in outlines]))
     if len(corners) < 3:
         raise complain(elements[0], "needs at least three <point>s that are not on one line")
     # Meshes of equal outlines compare equal.
-    digest = hashlib.blake2b(repr([outline.tolist() for outline in outlines]).encode(), digest_size=8).hexdigest()
+    digest = hashlib.blake2b(
+        repr([outline.tolist() for outline in outlines]).encode(), digest_size=8
+    ).hexdigest()
     origin = f"polyline {digest} {height!r}"
-    is_convex = len(elements) == 1 and abs(polygon_area(outlines[0])) >= 0.99 * polygon_area(corners)
+    is_convex = len(elements) == 1 and abs(polygon_area(outlines[0])) >= 0.99 * polygon_area(
+        corners
+    )
     is_fine = sum(map(len, outlines)) > MOST_POINTS
     if is_fine and not is_convex:
-        context.note("replaced", elements[0], f"a polyline of more than {MOST_POINTS} points by its convex hull")
+        context.note(
+            "replaced",
+            elements[0],
+            f"a polyline of more than {MOST_POINTS} points by its convex hull",
+        )
     if is_convex or is_fine:
         low = np.column_stack([corners, np.zeros(len(corners))])
         try:
@@ -329,7 +384,9 @@ def _polyline(geometry: Element, context: Context, scale: Vector) -> Placed:
         pieces = convex_pieces(whole.vertices, whole.faces, MOST_PIECES)
     except ValueError as error:
         raise complain(elements[0], str(error)) from None
-    return _of_pieces(whole, [Mesh(f"{origin} {number}", *piece) for number, piece in enumerate(pieces)])
+    return _of_pieces(
+        whole, [Mesh(f"{origin} {number}", *piece) for number, piece in enumerate(pieces)]
+    )
 
 
 def _of_pieces(whole: Shape, pieces: list[Mesh]) -> Placed:

@@ -61,15 +61,21 @@ def included(include: Element, files: tuple[Path, ...], context: Context) -> Par
     if merged and (include.parent is None or include.parent.tag != "model"):
         if not context.ignores("include"):
             raise refuse(
-                include, "include", "merge='true' puts the links of a model into the model around it; here is none"
+                include,
+                "include",
+                "merge='true' puts the links of a model into the model around it; here is none",
             )
-        context.note("ignored", include, "merge='true' outside of a model: left out by --ignore include")
+        context.note(
+            "ignored", include, "merge='true' outside of a model: left out by --ignore include"
+        )
         return None
     root = _root(include, uri, context)
     if root is None:
         return None
     if root.source in files:
-        chain = " includes ".join(path.name for path in (*files[files.index(root.source) :], root.source))
+        chain = " includes ".join(
+            path.name for path in (*files[files.index(root.source) :], root.source)
+        )
         raise complain(include, f"the includes form a cycle: {chain}")
     models = root.findall("model")
     instead = [why for tag, why in NO_MODELS.items() if root.find(tag) is not None]
@@ -84,7 +90,14 @@ def included(include: Element, files: tuple[Path, ...], context: Context) -> Par
     name = text_of(include.find("name")) or own
     # The name of its frame in libsdformat, which nothing else may have.
     name = f"_merged__{name}__model__" if merged else name
-    return Part(element=models[0], at=include, name=name, files=(*files, root.source), static=static, merged=merged)
+    return Part(
+        element=models[0],
+        at=include,
+        name=name,
+        files=(*files, root.source),
+        static=static,
+        merged=merged,
+    )
 
 
 def _last_of(uri: str) -> str:
@@ -106,7 +119,9 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
     try:
         root = _file_root(include, uri, context)
         if root.source.parent == FOLDER and root.find("model") is not None:
-            _note_replaced(include, uri, "the one built into ddenv, which is like Gazebo's", context)
+            _note_replaced(
+                include, uri, "the one built into ddenv, which is like Gazebo's", context
+            )
         return root
     except (Missing, Unusable, UserError) as error:
         if context.may_guess(uri):
@@ -136,7 +151,9 @@ def _file_root(include: Element, uri: str, context: Context) -> Element:
         return context.files[path]
     names_folder = not uri.rstrip("/").endswith(path.name)
     if names_folder and (fault := context.resources.config_fault(path.parent)):
-        context.note("ignored", include, f"model.config of '{uri[:200]}', {fault}; {path.name} is taken")
+        context.note(
+            "ignored", include, f"model.config of '{uri[:200]}', {fault}; {path.name} is taken"
+        )
     root = context.files[path] = root_of(text, path, context)
     return root
 
@@ -168,9 +185,14 @@ def _guessed_root(include: Element, uri: str, context: Context) -> Element | Non
 def _stand_in_root(include: Element, text: str, stand_in: StandIn) -> Element:
     """A file with one static model of the stand-in's shape."""
     if isinstance(stand_in, str):
-        raise complain(include, f"the stand-in '{text}' is for meshes; use one of {', '.join(SIZES)} for a whole model")
+        raise complain(
+            include,
+            f"the stand-in '{text}' is for meshes; use one of {', '.join(SIZES)} for a whole model",
+        )
     kind, sizes = primitive(stand_in.shape)
-    words = "".join(f"<{tag}>{' '.join(map(repr, values))}</{tag}>" for tag, values in sizes.items())
+    words = "".join(
+        f"<{tag}>{' '.join(map(repr, values))}</{tag}>" for tag, values in sizes.items()
+    )
     pose = " ".join(repr(value) for value in (*stand_in.offset.position, 0.0, 0.0, 0.0))
     inside = f"<pose>{pose}</pose><geometry><{kind}>{words}</{kind}></geometry>"
     sdf = (

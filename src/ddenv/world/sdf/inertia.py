@@ -9,7 +9,18 @@ from functools import partial
 
 import numpy as np
 
-from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Ground, Inertia, Mesh, Shape, Sphere
+from ddenv.world.model import (
+    Box,
+    Capsule,
+    Collision,
+    Cylinder,
+    Ellipsoid,
+    Ground,
+    Inertia,
+    Mesh,
+    Shape,
+    Sphere,
+)
 from ddenv.world.pose import Pose, Vector, vector
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import pose_of
@@ -29,7 +40,11 @@ LIGHTEST_IN_CONTACT = 1e-5
 
 
 def read_inertia(
-    link: Element, link_pose: Pose, collisions: Sequence[Collision], density: Sequence[float], context: Context
+    link: Element,
+    link_pose: Pose,
+    collisions: Sequence[Collision],
+    density: Sequence[float],
+    context: Context,
 ) -> Inertia:
     """The inertia of a moving link at `link_pose`, in the world frame; `density` (kg/m^3) has one entry per collision."""
     evenly = partial(spread, collisions, density, link_pose)
@@ -37,15 +52,21 @@ def read_inertia(
     if all(isinstance(one.shape, Ground) for one in collisions):
         return inertia
     least = evenly(LIGHTEST_IN_CONTACT)
-    solid_enough = f"contacts need at least those of {LIGHTEST_IN_CONTACT:g} kg, spread evenly over its shapes"
+    solid_enough = (
+        f"contacts need at least those of {LIGHTEST_IN_CONTACT:g} kg, spread evenly over its shapes"
+    )
     if inertia.mass < least.mass:
-        context.note("replaced", link, f"too light, {inertia.mass:.3g} kg: mass and inertia; {solid_enough}")
+        context.note(
+            "replaced", link, f"too light, {inertia.mass:.3g} kg: mass and inertia; {solid_enough}"
+        )
         return least
     lowest = _principal(inertia.moments, inertia.products)[0]
     needed = _principal(least.moments, least.products)[0]
     if lowest >= needed:
         return inertia
-    context.note("replaced", link, f"too small moments of inertia, {lowest:.3g} kg m^2: {solid_enough}")
+    context.note(
+        "replaced", link, f"too small moments of inertia, {lowest:.3g} kg m^2: {solid_enough}"
+    )
     return replace(inertia, moments=vector(moment + needed for moment in inertia.moments))
 
 
@@ -61,7 +82,9 @@ def _given(
     """
     element = link.find("inertial")
     if element is None:
-        context.note("replaced", link, f"no <inertial>: {DEFAULT_MASS:g} kg, spread evenly over its shapes")
+        context.note(
+            "replaced", link, f"no <inertial>: {DEFAULT_MASS:g} kg, spread evenly over its shapes"
+        )
         return evenly(DEFAULT_MASS)
     mass = number_or_nan(element, "mass", DEFAULT_MASS)
     if element.get("auto", "").strip().lower() in ("1", "true"):
@@ -85,7 +108,9 @@ def _given(
     if tensor is not None:
         words = (text_of(tensor.find(tag))[:12] or "1" for tag in ("ixx", "iyy", "izz"))
         said = f"moments {' '.join(words)} kg m^2 are impossible"
-    context.note("replaced", element, f"{said}: computed from its shapes and its mass of {mass:g} kg")
+    context.note(
+        "replaced", element, f"{said}: computed from its shapes and its mass of {mass:g} kg"
+    )
     return evenly(mass)
 
 
@@ -113,7 +138,9 @@ def read_density(parent: Element, default: float) -> float:
         return default
     density = numbers(element, 1)[0]
     if not THINNEST <= density <= DENSEST:
-        raise complain(element, f"a density must be from {THINNEST:g} to {DENSEST:g} kg/m^3, found {density:g}")
+        raise complain(
+            element, f"a density must be from {THINNEST:g} to {DENSEST:g} kg/m^3, found {density:g}"
+        )
     return density
 
 
@@ -136,21 +163,31 @@ def _principal(moments: Vector, products: Vector) -> Vector:
     return low, middle, high
 
 
-def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose: Pose, mass: float | None) -> Inertia:
+def spread(
+    collisions: Sequence[Collision], density: Sequence[float], link_pose: Pose, mass: float | None
+) -> Inertia:
     """The inertia of solid shapes (overlaps count twice), scaled to `mass` (kg) unless that is None."""
-    pairs = [(one, each) for one, each in zip(collisions, density, strict=True) if not isinstance(one.shape, Ground)]
+    pairs = [
+        (one, each)
+        for one, each in zip(collisions, density, strict=True)
+        if not isinstance(one.shape, Ground)
+    ]
     if not pairs:
         return _ball(link_pose, DEFAULT_MASS if mass is None else mass)
     solids = [(*solid(one.shape), one.pose, each) for one, each in pairs]
     masses = np.array([volume * each for volume, _, _, _, each in solids])
-    centers = np.array([np.array(pose.position) + pose.rotation() @ center for _, center, _, pose, _ in solids])
+    centers = np.array(
+        [np.array(pose.position) + pose.rotation() @ center for _, center, _, pose, _ in solids]
+    )
     total = max(float(masses.sum()), LIGHTEST)
     middle = masses @ centers / total
     tensor = np.zeros((3, 3))
     for (_, _, unit, pose, _), each, center in zip(solids, masses, centers, strict=True):
         rotation = pose.rotation()
         arm = center - middle
-        tensor += each * (rotation @ unit @ rotation.T + (arm @ arm) * np.eye(3) - np.outer(arm, arm))
+        tensor += each * (
+            rotation @ unit @ rotation.T + (arm @ arm) * np.eye(3) - np.outer(arm, arm)
+        )
     factor = 1.0 if mass is None else mass / total
     tensor *= factor
     moments = vector(tensor[axis, axis] for axis in range(3))
@@ -185,7 +222,9 @@ def solid(shape: Shape) -> tuple[float, np.ndarray, np.ndarray]:
             balls = 4 / 3 * math.pi * radius**3
             # Two half balls, each with its centre of mass 3/8 r beyond the end of the tube.
             across = 0.4 * radius**2 + length**2 / 4 + 3 / 8 * length * radius
-            unit = tube * _cylinder(radius, length) + balls * np.diag([across, across, 0.4 * radius**2])
+            unit = tube * _cylinder(radius, length) + balls * np.diag(
+                [across, across, 0.4 * radius**2]
+            )
             return tube + balls, origin, unit / (tube + balls)
         case Mesh(_, vertices, faces):
             import trimesh
@@ -193,7 +232,11 @@ def solid(shape: Shape) -> tuple[float, np.ndarray, np.ndarray]:
             # About its middle, since the sums lose digits far from the origin.
             middle = vertices.mean(axis=0)
             whole = trimesh.triangles.mass_properties((vertices - middle)[faces])
-            return whole.volume, whole.center_mass + middle, np.asarray(whole.inertia) / whole.volume
+            return (
+                whole.volume,
+                whole.center_mass + middle,
+                np.asarray(whole.inertia) / whole.volume,
+            )
     raise TypeError(type(shape).__name__)
 
 

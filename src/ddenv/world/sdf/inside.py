@@ -41,18 +41,30 @@ def opened(world: World, root: Element) -> World:
         if not model.static:
             closed = "it can move"
         elif len({(link.name, one.name) for link in model.links for one in link.collisions}) == 1:
-            closed = "it is one mesh; 'ddenv world convert' writes its pieces as collisions of their own"
+            closed = (
+                "it is one mesh; 'ddenv world convert' writes its pieces as collisions of their own"
+            )
         elif model.name in world.anchors:
             closed = "other models depend on it"
         elif element.tag == "include" or element.find(".//include") is not None:
             closed = "parts of it are in files that cannot be copied into this one; 'ddenv world convert' does it"
         links = {} if closed else dict(_links(element))
-        parts = [part for link in model.links if links for part in _parts(model, link, links[link.name])]
+        parts = [
+            part for link in model.links if links for part in _parts(model, link, links[link.name])
+        ]
         names = {part.name for part in parts}
         if len(names) < len(parts) or not taken.isdisjoint(names):
             closed = "two of its parts, or a part and a model, have one name"
         if closed:
-            notes.append(Note(kind="ignored", model=model.name, place=place(element), what="--inside", why=f"it stays whole, since {closed}"))
+            notes.append(
+                Note(
+                    kind="ignored",
+                    model=model.name,
+                    place=place(element),
+                    what="--inside",
+                    why=f"it stays whole, since {closed}",
+                )
+            )
             models.append(model)
             continue
         taken |= names
@@ -72,7 +84,10 @@ def _links(element: Element, prefix: str = "") -> Iterator[tuple[str, Element]]:
 
 def _parts(model: Model, link: Link, element: Element) -> Iterator[Model]:
     """The collisions of a link as models, each with its pieces, and with the visuals that are nearest to it."""
-    named = {tag: {child.get("name"): child for child in element.findall(tag)} for tag in ("collision", "visual")}
+    named = {
+        tag: {child.get("name"): child for child in element.findall(tag)}
+        for tag in ("collision", "visual")
+    }
     shown: dict[int, list[Visual]] = {}
     for visual in link.visuals if link.collisions else ():
         gaps = [math.dist(visual.pose.position, one.pose.position) for one in link.collisions]
@@ -101,7 +116,9 @@ def _mesh_or_number(numbered: tuple[int, Collision]) -> tuple[str, int]:
     return ("", number) if collision.piece is None else (collision.name, id(collision.piece.mesh))
 
 
-def _emptied(model: Model, element: Element, links: dict[str, Element], parts: list[Model]) -> Iterator[Shared]:
+def _emptied(
+    model: Model, element: Element, links: dict[str, Element], parts: list[Model]
+) -> Iterator[Shared]:
     """The links and models that go with the last of their parts."""
     spans: dict[tuple[int, int], set[str]] = {}
     for part in parts:
@@ -129,7 +146,9 @@ def has_includes(part: Part) -> bool:
     return part.at is not part.element or part.element.find(".//include") is not None
 
 
-def with_copies(text: bytes, path: Path, scope: Scope, parts: Collection[Part], resources: Resources) -> bytes:
+def with_copies(
+    text: bytes, path: Path, scope: Scope, parts: Collection[Part], resources: Resources
+) -> bytes:
     """`text`, the content of the world `path`, with `parts` and all that they include written out; what cannot be copied stays.
 
     `resources` learns where the meshes of the copies are.
@@ -151,11 +170,17 @@ def _size(part: Part, scope: Scope, known: dict[int, int]) -> int:
     key = id(part.element)
     if key not in known:
         inner = scope.inside(part)
-        known[key] = part.element.end - part.element.start + sum(_size(one, inner, known) for one in inner.parts)
+        known[key] = (
+            part.element.end
+            - part.element.start
+            + sum(_size(one, inner, known) for one in inner.parts)
+        )
     return known[key]
 
 
-def _copies(part: Part, scope: Scope, text: bytes, folder: str, resources: Resources, moved: Moved) -> Iterator[Edit]:
+def _copies(
+    part: Part, scope: Scope, text: bytes, folder: str, resources: Resources, moved: Moved
+) -> Iterator[Edit]:
     """The changes of `text`, the content of the file that names `part`; relative URIs in that file start in `folder`."""
     if part.at is part.element:
         for inner in scope.inside(part).parts:
@@ -171,7 +196,9 @@ def _copies(part: Part, scope: Scope, text: bytes, folder: str, resources: Resou
     # A URDF file, and a stand-in for a file, have no `<model>` that could be copied.
     if source != part.element.source or not copied.startswith(b"<model", part.element.start):
         return
-    folder = _joined(folder, posixpath.dirname(uri) if uri.rpartition("/")[2] == source.name else uri)
+    folder = _joined(
+        folder, posixpath.dirname(uri) if uri.rpartition("/")[2] == source.name else uri
+    )
     edits: list[Edit] = []
     for inner in scope.inside(part).parts:
         edits += _copies(inner, scope.inside(part), copied, folder, resources, moved)
@@ -188,7 +215,9 @@ def _copies(part: Part, scope: Scope, text: bytes, folder: str, resources: Resou
     own["canonical_link"] = part.element.get("canonical_link", "")
     tag = "".join(f" {name}={quoteattr(value)}" for name, value in own.items() if value)
     # An empty `<model .../>` has no end tag.
-    inside = edited(copied[: part.element.end], edits)[tag_end(copied, part.element) :] or b"</model>"
+    inside = (
+        edited(copied[: part.element.end], edits)[tag_end(copied, part.element) :] or b"</model>"
+    )
     start = f"<model{tag}>".encode() + b"".join(text[child.start : child.end] for child in given)
     yield part.at.start, part.at.end, start + inside
 

@@ -52,19 +52,31 @@ def read_joints(spot: Spot, links: dict[str, LinkPose], context: Context) -> lis
     for element in spot.scope.element.findall("joint"):
         note_unread(element, context)
         if name_of(element) in names:
-            raise complain(element, "this joint name is used twice; give each joint of the model its own name")
+            raise complain(
+                element, "this joint name is used twice; give each joint of the model its own name"
+            )
         names.add(name_of(element))
         kind = element.get("type", "")
         if kind in KINDS:
             joints.append(_joint(element, kind, spot, links, context))
         elif context.ignores("joint"):
-            context.note("ignored", element, f"a '{kind}' joint is left out by --ignore: its links move freely")
+            context.note(
+                "ignored",
+                element,
+                f"a '{kind}' joint is left out by --ignore: its links move freely",
+            )
         else:
-            raise refuse(element, "joint", f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
+            raise refuse(
+                element,
+                "joint",
+                f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})",
+            )
     return joints
 
 
-def _joint(element: Element, kind: str, spot: Spot, links: dict[str, LinkPose], context: Context) -> Joint:
+def _joint(
+    element: Element, kind: str, spot: Spot, links: dict[str, LinkPose], context: Context
+) -> Joint:
     parent, child = (_end(element, tag, spot, links) for tag in ("parent", "child"))
     if parent == child:
         raise complain(element, f"joins '{child}' to itself")
@@ -92,8 +104,12 @@ def _joint(element: Element, kind: str, spot: Spot, links: dict[str, LinkPose], 
         damping=0.0 if dynamics is None else number(dynamics, "damping", 0.0),
         axis2=None if second is None else moved.rotate(second),
     )
-    if limit is not None and (joint.lower > joint.upper or joint.lower == math.inf or joint.upper == -math.inf):
-        raise complain(limit, f"the lower limit {joint.lower:g} is above the upper limit {joint.upper:g}")
+    if limit is not None and (
+        joint.lower > joint.upper or joint.lower == math.inf or joint.upper == -math.inf
+    ):
+        raise complain(
+            limit, f"the lower limit {joint.lower:g} is above the upper limit {joint.upper:g}"
+        )
     if dynamics is not None and joint.damping < 0:
         raise complain(dynamics, f"damping must not be negative, found {joint.damping:g}")
     return _relative_to_start(joint, first, links)
@@ -165,11 +181,17 @@ def _relative_to_start(joint: Joint, axis: Vector, links: dict[str, LinkPose]) -
 
 
 def _note_unread(element: Element, kind: str, context: Context) -> None:
-    for axis in (each for each in (element.find("axis"), element.find("axis2")) if each is not None):
+    for axis in (
+        each for each in (element.find("axis"), element.find("axis2")) if each is not None
+    ):
         limit = axis.find("limit")
         old = axis.find("use_parent_model_frame")
         bounds = [] if limit is None else [*limit.iter("lower"), *limit.iter("upper")]
-        if limit is not None and kind not in LIMITED and any(abs(sum(floats(one))) < UNLIMITED for one in bounds):
+        if (
+            limit is not None
+            and kind not in LIMITED
+            and any(abs(sum(floats(one))) < UNLIMITED for one in bounds)
+        ):
             context.note("ignored", limit, f"the limits of a {kind} joint")
         if old is not None and version(old) >= (1, 7):
             context.note("ignored", old, "it has no effect since SDF 1.7")

@@ -92,7 +92,9 @@ def _in_unit_range(word: str) -> bool:
 def _is_pose(text: str, count: int) -> bool:
     words = text.split()
     infinite = re.compile(r"[+-]?(inf|nan)", re.IGNORECASE)
-    return len(words) == count and all(_is_number(word) and not infinite.match(word) for word in words)
+    return len(words) == count and all(
+        _is_number(word) and not infinite.match(word) for word in words
+    )
 
 
 def _are_numbers(text: str, count: int) -> bool:
@@ -108,7 +110,10 @@ CHECKS: dict[str, tuple[Callable[[str], bool], str]] = {
     "float": (_is_number, "a number"),
     "int": (lambda text: _is_whole(text, bits=31), "a whole number"),
     "unsigned": (lambda text: _is_whole(text, bits=64), "a whole number"),
-    "time": (lambda text: re.match(r"\s*+[+-]?\d++\s++[+-]?\d", text) is not None, "seconds and nanoseconds"),
+    "time": (
+        lambda text: re.match(r"\s*+[+-]?\d++\s++[+-]?\d", text) is not None,
+        "seconds and nanoseconds",
+    ),
     "vector2": (lambda text: _are_numbers(text, 2), "2 numbers"),
     "vector3": (lambda text: _are_numbers(text, 3), "3 numbers"),
     "color": (_is_color, "3 or 4 numbers from 0 to 1"),

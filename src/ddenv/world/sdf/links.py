@@ -72,7 +72,10 @@ def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local:
     density = []
     visuals = []
     for item in items:
-        if item.element.tag == "collision" and (placed := _settled(item, items, element, context)) is not None:
+        if (
+            item.element.tag == "collision"
+            and (placed := _settled(item, items, element, context)) is not None
+        ):
             solids = _collisions(item, placed, pose, context)
             collisions += solids
             density += [read_density(item.element, usual)] * len(solids)
@@ -82,11 +85,23 @@ def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local:
         context.note("ignored", kinematic, "forces move it like any other link")
     for item in items:
         if isinstance(item.shape, Lost) and item.element.tag == "visual":
-            context.note("ignored", item.shape.element, f"'{item.shape.uri}' is not drawn: {item.shape.reason}")
+            context.note(
+                "ignored",
+                item.shape.element,
+                f"'{item.shape.uri}' is not drawn: {item.shape.reason}",
+            )
         elif isinstance(item.shape, Placed) and item.element.tag == "visual":
             place = pose @ item.pose @ item.shape.offset
-            visuals.append(Visual(name_of(item.element), item.shape.shape, place, read_color(item.element)))
-    return Link(name=spot.prefix + name_of(element), pose=pose, inertia=inertia, collisions=tuple(collisions), visuals=tuple(visuals))
+            visuals.append(
+                Visual(name_of(item.element), item.shape.shape, place, read_color(item.element))
+            )
+    return Link(
+        name=spot.prefix + name_of(element),
+        pose=pose,
+        inertia=inertia,
+        collisions=tuple(collisions),
+        visuals=tuple(visuals),
+    )
 
 
 @dataclass(frozen=True)
@@ -107,7 +122,12 @@ def _collisions(item: _Item, placed: Placed, pose: Pose, context: Context) -> li
     name = name_of(item.element)
     if not isinstance(placed.shape, Mesh) or not placed.pieces:
         return [Collision(name=name, shape=placed.shape, pose=place, mu=mu)]
-    return [Collision(name=name, shape=shape, pose=place @ offset, mu=mu, piece=Piece(placed.shape, offset)) for shape, offset in placed.pieces]
+    return [
+        Collision(
+            name=name, shape=shape, pose=place @ offset, mu=mu, piece=Piece(placed.shape, offset)
+        )
+        for shape, offset in placed.pieces
+    ]
 
 
 def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -> Placed | None:
@@ -116,21 +136,33 @@ def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -
         return item.shape
     lost = item.shape
     if lost.word == NONE:
-        context.note("ignored", lost.element, f"'{lost.uri}' is left out as asked: nothing collides with it")
+        context.note(
+            "ignored", lost.element, f"'{lost.uri}' is left out as asked: nothing collides with it"
+        )
         return None
     if lost.word == AUTO:
         context.guessed.append((context.model, lost.uri))
     if lost.word:
         kind = "visual" if lost.word == AUTO else lost.word
-        near = [(one.shape, one.pose) for one in items if one.element.tag == kind and isinstance(one.shape, Placed)]
+        near = [
+            (one.shape, one.pose)
+            for one in items
+            if one.element.tag == kind and isinstance(one.shape, Placed)
+        ]
         box = around(shape_bounds(one.shape, pose @ one.offset) for one, pose in near)
         if box is not None:
-            context.note("replaced", lost.element, f"'{lost.uri}' by the box around its link's {kind} shapes")
+            context.note(
+                "replaced", lost.element, f"'{lost.uri}' by the box around its link's {kind} shapes"
+            )
             middle = Pose(vector((box[0] + box[1]) / 2))
-            return Placed(Box(vector(np.maximum(box[1] - box[0], 1e-3))), item.pose.inverse() @ middle)
+            return Placed(
+                Box(vector(np.maximum(box[1] - box[0], 1e-3))), item.pose.inverse() @ middle
+            )
         if lost.word == AUTO:
             return _guessed(lost, item, link, context)
-        raise complain(lost.element, f"its link has no {kind} shape that could replace '{lost.uri[:200]}'")
+        raise complain(
+            lost.element, f"its link has no {kind} shape that could replace '{lost.uri[:200]}'"
+        )
     if context.ignores("mesh"):
         why = f"'{lost.uri}' {lost.problem} ({lost.reason}): nothing collides with it"
         context.note("ignored", lost.element, why)
@@ -138,7 +170,9 @@ def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -
     kinds = {other.element.tag for other in items if isinstance(other.shape, Placed)}
     if lost.unreadable:
         context.unreadable[lost.uri] = lost.reason
-    context.missing.setdefault(lost.uri, complain(lost.element, remedies(lost, tuple(sorted(kinds)))))
+    context.missing.setdefault(
+        lost.uri, complain(lost.element, remedies(lost, tuple(sorted(kinds))))
+    )
     return None
 
 
@@ -152,7 +186,9 @@ def _guessed(lost: Lost, item: _Item, link: Element, context: Context) -> Placed
     context.note("replaced", lost.element, f"'{lost.uri}' by a guess, {text}: {why}")
     if scale is None:
         mass = link.find("inertial/pose")
-        return Placed(stand_in.shape, item.pose.inverse() @ (HERE if mass is None else pose_of(mass)))
+        return Placed(
+            stand_in.shape, item.pose.inverse() @ (HERE if mass is None else pose_of(mass))
+        )
     by = [abs(own / usual) for own, usual in zip(lost.scale, scale, strict=True)]
     return scaled(stand_in, vector(by), lost.element)
 
@@ -219,7 +255,9 @@ def read_color(visual: Element) -> Color | None:
         element = visual.find(tag)
         if element is not None and text_of(element):
             count = 4 if len(text_of(element).split()) == 4 else 3
-            red, green, blue, *alpha = (min(max(value, 0.0), 1.0) for value in numbers(element, count))
+            red, green, blue, *alpha = (
+                min(max(value, 0.0), 1.0) for value in numbers(element, count)
+            )
             # Many files have colours with an alpha of zero, which the simulators that wrote them ignored.
             return red, green, blue, ((alpha or [1.0])[0] or 1.0) * opacity
     name = text_of(visual.find("material/script/name")).removeprefix("Gazebo/")

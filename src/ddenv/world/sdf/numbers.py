@@ -69,11 +69,18 @@ _SIZE = _times("m", 0.1, 3.0)
 _ERROR = _up_to("", 0.005, 0.5)
 # An option of an own controller: what it means, only its author knows.
 _OPTION = Kind(
-    "", 1e-6, lambda now, _: (min(0.1 * now, 10.0 * now), max(0.1 * now, 10.0 * now)) if now else (-1.0, 1.0)
+    "",
+    1e-6,
+    lambda now, _: (min(0.1 * now, 10.0 * now), max(0.1 * now, 10.0 * now)) if now else (-1.0, 1.0),
 )
 SIZES = ("radius", "length", "size_x", "size_y", "size_z")
 # The numbers of a model, those first that promise most.
-OF_MODELS = {"friction": _up_to("", 0.002, 1.0), "x": _PLACE, "y": _PLACE, **dict.fromkeys(SIZES, _SIZE)}
+OF_MODELS = {
+    "friction": _up_to("", 0.002, 1.0),
+    "x": _PLACE,
+    "y": _PLACE,
+    **dict.fromkeys(SIZES, _SIZE),
+}
 OF_MODELS |= {"yaw": _ANGLE, "z": _HEIGHT, "mass": _times("kg", 0.1, 10.0)}
 # Those of a scenario, with the keys under which it has them.
 OF_SCENARIO: dict[str, tuple[Kind, Names]] = {
@@ -87,7 +94,9 @@ OF_SCENARIO: dict[str, tuple[Kind, Names]] = {
     "lidar.noise": (_up_to("m", 0.005, 0.3), ("sensors", "lidar", "noise")),
 }
 _NOISES = [
-    name for name in Sensors.model_fields if name.removesuffix("_bias") in ("compass", "gyro", "tilt", "odometry")
+    name
+    for name in Sensors.model_fields
+    if name.removesuffix("_bias") in ("compass", "gyro", "tilt", "odometry")
 ]
 OF_SCENARIO |= {f"sensors.{name}": (_ERROR, ("sensors", name)) for name in _NOISES}
 OPTIONS = "controller.options."
@@ -113,13 +122,17 @@ class NotPossible(ValueError):
     """A number cannot have a value; the message says why."""
 
 
-def numbers_of(scenario: Scenario, world: World, robot: Model, kept: Iterable[str]) -> dict[str, Number]:
+def numbers_of(
+    scenario: Scenario, world: World, robot: Model, kept: Iterable[str]
+) -> dict[str, Number]:
     """The numbers by name, of the models `kept` and of the scenario. Those that promise most come first."""
     box = bounds(robot.collisions)
     length = 1.0 if box is None else float((box[1] - box[0])[:2].max())
     # Those of directives stand in files of their own.
     kept = () if is_directives(world.path) else kept
-    models = [one for one in map(world.model, kept) if one.name not in world.anchors and not one.inside]
+    models = [
+        one for one in map(world.model, kept) if one.name not in world.anchors and not one.inside
+    ]
     values: list[tuple[Kind, str, Any]] = [
         (kind, f"{model.name}.{what}", _of_model(world, model, what))
         for what, kind in OF_MODELS.items()
@@ -131,12 +144,28 @@ def numbers_of(scenario: Scenario, world: World, robot: Model, kept: Iterable[st
             section = getattr(section, key)
         values.append((kind, name, getattr(section, last, None)))
     options = scenario.controller.options if ":" in scenario.controller.use else {}
-    values += [(_OPTION, f"{OPTIONS}{name}", value) for name, value in options.items() if type(value) in (int, float)]
+    values += [
+        (_OPTION, f"{OPTIONS}{name}", value)
+        for name, value in options.items()
+        if type(value) in (int, float)
+    ]
     found = {}
-    for kind, name, now in ((kind, name, float(value)) for kind, name, value in values if value is not None):
+    for kind, name, now in (
+        (kind, name, float(value)) for kind, name, value in values if value is not None
+    ):
         low, high = (float(f"{end:.9g}") for end in kind.range(now, length))
-        resolution = max(kind.matters, 0.0 if kind in (_PLACE, _HEIGHT, _ANGLE) else PART * abs(now))
-        found[name] = Number(name=name, now=now, low=low, high=high, scale=max(high - now, now - low), resolution=resolution, unit=kind.unit)
+        resolution = max(
+            kind.matters, 0.0 if kind in (_PLACE, _HEIGHT, _ANGLE) else PART * abs(now)
+        )
+        found[name] = Number(
+            name=name,
+            now=now,
+            low=low,
+            high=high,
+            scale=max(high - now, now - low),
+            resolution=resolution,
+            unit=kind.unit,
+        )
     return found
 
 
@@ -146,8 +175,14 @@ def chosen(numbers: Mapping[str, Number], globs: Iterable[str]) -> list[Number]:
     for glob in globs:
         if not any(fnmatchcase(name, glob) for name in numbers):
             near = nearest(glob, numbers)
-            raise UserError(f"--number: there is no number '{glob}'{near}; examples: {', '.join(list(numbers)[:3])}")
-    return [one for name, one in numbers.items() if not globs or any(fnmatchcase(name, glob) for glob in globs)]
+            raise UserError(
+                f"--number: there is no number '{glob}'{near}; examples: {', '.join(list(numbers)[:3])}"
+            )
+    return [
+        one
+        for name, one in numbers.items()
+        if not globs or any(fnmatchcase(name, glob) for glob in globs)
+    ]
 
 
 def _of_model(world: World, model: Model, what: str) -> float | None:
@@ -175,7 +210,9 @@ def _of_model(world: World, model: Model, what: str) -> float | None:
 # Other values.
 
 
-def changed(scenario: Scenario, world: World, changes: Mapping[str, float]) -> tuple[Scenario, World]:
+def changed(
+    scenario: Scenario, world: World, changes: Mapping[str, float]
+) -> tuple[Scenario, World]:
     """The scenario and the world with these values of numbers. Raises NotPossible."""
     data = scenario.model_dump()
     of_scenario = False
@@ -207,11 +244,19 @@ def part_of(
     whole = whole_of(world, scenario)
     scenario, world = changed(scenario, world, changes)
     if scenario.oracle is None:
-        world = replace(world, models=tuple(model for model in world.models if model.name not in gone))
+        world = replace(
+            world, models=tuple(model for model in world.models if model.name not in gone)
+        )
     return scenario.model_copy(update={"whole": whole}), world
 
 
-def check(scenario: Scenario, world: World, robot: Model, kept: frozenset[str], changes: Mapping[str, float]) -> None:
+def check(
+    scenario: Scenario,
+    world: World,
+    robot: Model,
+    kept: frozenset[str],
+    changes: Mapping[str, float],
+) -> None:
     """Raises NotPossible if numbers cannot have these values: then the robot stands in a model at its start, or a changed model in
     another one that it did not stand in.
     """
@@ -244,7 +289,11 @@ def _with(scenario: Scenario, world: World, name: str, value: float) -> World:
     pose = at.find("pose")
     words = text_of(pose).split()
     if what == "friction":
-        edits = [edit for collision in at.iter("collision") for edit in _friction(world.text, collision, number)]
+        edits = [
+            edit
+            for collision in at.iter("collision")
+            for edit in _friction(world.text, collision, number)
+        ]
     elif what not in ("x", "y", "z", "yaw"):
         edits = list(_sizes(world, model, at, what, number))
     elif pose is not None and not pose.attrib and len(words) == 6 and len(model.spans) == 1:
@@ -263,14 +312,18 @@ def _with(scenario: Scenario, world: World, name: str, value: float) -> World:
         raise NotPossible(str(error)) from None
     found = _of_model(after, after.model(owner), what)
     if found is None or not math.isclose(found, value, rel_tol=1e-6, abs_tol=1e-6):
-        raise NotPossible(f"the world file does not give the {what} of {owner} in a form that can be changed")
+        raise NotPossible(
+            f"the world file does not give the {what} of {owner} in a form that can be changed"
+        )
     return after
 
 
 def move_of(model: Model, what: str, value: float) -> Pose:
     """How a model moves in the world where one of its x, y, z (m) and yaw (rad) has this value; not at all for other numbers."""
     turn = value - model.pose.yaw() if what == "yaw" else 0.0
-    x, y, z = (value if axis == what else now for axis, now in zip("xyz", model.pose.position, strict=True))
+    x, y, z = (
+        value if axis == what else now for axis, now in zip("xyz", model.pose.position, strict=True)
+    )
     return Pose.from_rpy(x, y, z, 0.0, 0.0, turn) @ Pose(model.pose.position).inverse()
 
 
@@ -281,9 +334,15 @@ def _sizes(world: World, model: Model, at: Element, what: str, number: str) -> I
     for element in at.iter(tag):
         values = floats(element)
         words = text_of(element).split()
-        of_shape = element.parent is not None and element.parent.tag in ("box", "cylinder", "sphere")
+        of_shape = element.parent is not None and element.parent.tag in (
+            "box",
+            "cylinder",
+            "sphere",
+        )
         if len(values) > place and values[place] == now and (of_shape or what == "mass"):
-            yield with_words(world.text, element, " ".join([*words[:place], number, *words[place + 1 :]]))
+            yield with_words(
+                world.text, element, " ".join([*words[:place], number, *words[place + 1 :]])
+            )
 
 
 def _friction(text: bytes, collision: Element, number: str) -> Iterator[Edit]:
@@ -291,8 +350,12 @@ def _friction(text: bytes, collision: Element, number: str) -> Iterator[Edit]:
     for engine, tags in (("ode", ("mu", "mu2")), ("bullet", ("friction", "friction2"))):
         if (holder := collision.find(f"surface/friction/{engine}")) is not None:
             said = {tag: holder.find(tag) for tag in tags}
-            yield from (with_words(text, each, number) for each in said.values() if each is not None)
-            if lacks := "".join(f"<{tag}>{number}</{tag}>" for tag, each in said.items() if each is None):
+            yield from (
+                with_words(text, each, number) for each in said.values() if each is not None
+            )
+            if lacks := "".join(
+                f"<{tag}>{number}</{tag}>" for tag, each in said.items() if each is None
+            ):
                 yield with_child(text, holder, lacks)
             return
     holder = collision

@@ -20,7 +20,9 @@ from ddenv.world.sdf.xml import Element, number_or_nan, parse, place, text_of
 
 # The checker's slack for rounded numbers, as a part of the greatest moment of inertia that the body can have.
 SLACK = 5 * float(np.finfo(float).eps)
-RESERVED_IN = frozenset(["world", "model", "link", "joint", "frame", "collision", "visual", "light", "sensor", "actor"])
+RESERVED_IN = frozenset(
+    ["world", "model", "link", "joint", "frame", "collision", "visual", "light", "sensor", "actor"]
+)
 # What a frame can be attached to.
 FRAMES = ("model", "link", "joint", "frame", "include")
 INCLUDABLE = ("model", "actor", "light")
@@ -87,7 +89,9 @@ class _Checker:
             names.add(name)
             if no_colons and "::" in name and child.tag != "include":
                 yield "'::' in a name", child
-            if child.tag in RESERVED_IN and (name == "world" != child.tag or name[:2] == name[-2:] == "__"):
+            if child.tag in RESERVED_IN and (
+                name == "world" != child.tag or name[:2] == name[-2:] == "__"
+            ):
                 yield "a name that is reserved", child
             if child.tag in TYPES and child.get("type") not in (None, *TYPES[child.tag]):
                 yield f"a <{child.tag}> of an unknown type", child
@@ -119,7 +123,9 @@ class _Checker:
             names = self.names[holder] = {}
             for child in (child for child in holder if child.tag in FRAMES):
                 model = self._model_of(child) if child.tag == "include" else child
-                names[self._name(child) or ""] = model if model is not None and model.tag == "model" else None
+                names[self._name(child) or ""] = (
+                    model if model is not None and model.tag == "model" else None
+                )
         return self.names[holder]
 
     def _name(self, element: Element) -> str | None:

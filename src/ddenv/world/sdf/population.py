@@ -30,7 +30,11 @@ def copies(population: Element, files: tuple[Path, ...], context: Context) -> li
         return []
     places = _places(population)
     made = f"by {len(places)} copies of its model, as in Gazebo Classic"
-    context.note("replaced", population, f"{made}; they stay, unless 'ddenv world convert' writes them out first")
+    context.note(
+        "replaced",
+        population,
+        f"{made}; they stay, unless 'ddenv world convert' writes them out first",
+    )
     model = _child(population, "model")
     return [_copy(model, number, place, files) for number, place in enumerate(places)]
 
@@ -44,7 +48,10 @@ def _places(population: Element) -> list[Vector]:
     given = COUNTS[kind]
     counts = [int(number(population, path, 0)) if path else 1 for path in given]
     if min(counts) < 1 or math.prod(counts) > MOST_MODELS:
-        raise complain(population, f"must stand for 1 to {MOST_MODELS} models; see its rows and cols, or model_count")
+        raise complain(
+            population,
+            f"must stand for 1 to {MOST_MODELS} models; see its rows and cols, or model_count",
+        )
     is_grid = kind == "grid"
     lengths = _child(population, "distribution/step" if is_grid else "box/size")
     size = step = np.array(numbers(lengths, 3))
@@ -74,7 +81,10 @@ def _child(population: Element, path: str) -> Element:
 def _copy(model: Element, number: int, place: Vector, files: tuple[Path, ...]) -> Part:
     name = f"{name_of(model)}_clone_{number}"
     position = " ".join(map(repr, place))
-    at = parse(f"<model name={quoteattr(name)}><pose>{position} 0 0 0</pose></model>".encode(), model.source)
+    at = parse(
+        f"<model name={quoteattr(name)}><pose>{position} 0 0 0</pose></model>".encode(),
+        model.source,
+    )
     at.start = model.start
     at.end = model.end
     at.line = model.line

@@ -36,11 +36,17 @@ def read_world(path: Path, reading: Reading = PLAIN) -> World:
     return parse_world(read_bytes(path), path, reading)
 
 
-def parse_world(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> World:
+def parse_world(
+    text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None
+) -> World:
     """The world in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
     context = Context(resources=resources or disk_of(path, reading), reading=reading)
     try:
-        return parse_directives(text, path, context) if is_directives(path) else _world(text, path, context)
+        return (
+            parse_directives(text, path, context)
+            if is_directives(path)
+            else _world(text, path, context)
+        )
     except UserError:
         # The error may only be a consequence of a missing file, such as a pose relative to a model in it.
         context.complain_of_missing()
@@ -54,7 +60,9 @@ def read_model(path: Path, reading: Reading = PLAIN) -> Model:
     return parse_model(read_bytes(path), path, reading)
 
 
-def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> Model:
+def parse_model(
+    text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None
+) -> Model:
     """The one model in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
     context = Context(resources=resources or disk_of(path, reading), reading=reading)
     scope = Scope(root_of(text, path, context), (path,), context)
@@ -82,7 +90,11 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     worlds = root.findall("world")
     if len(worlds) != 1:
         found = "no <world>" if not worlds else f"{len(worlds)} <world> elements"
-        instead = f"; to use its model in a world, {how_to_include(path)}" if root.find("model") is not None else ""
+        instead = (
+            f"; to use its model in a world, {how_to_include(path)}"
+            if root.find("model") is not None
+            else ""
+        )
         raise UserError(f"{path}: expected one <world> inside <sdf>, found {found}{instead}")
     world = worlds[0]
     joint = world.find("joint")
@@ -90,7 +102,11 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         raise complain(joint, "joints between models are not supported; put both models into one")
     note_unread(world, context)
     scope = Scope(world, (path,), context)
-    clones = [part for population in world.findall("population") for part in copies(population, (path,), context)]
+    clones = [
+        part
+        for population in world.findall("population")
+        for part in copies(population, (path,), context)
+    ]
     scope.parts += clones
     copied = {clone.at.start for clone in clones}
     models = _models(scope, state_entries(world), context)
@@ -98,7 +114,9 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     context.model = ""
     context.note_unused(root)
     anchors = scope.references()
-    gravity = next((each for tag in ("gravity", "physics/gravity") for each in world.findall(tag)), None)
+    gravity = next(
+        (each for tag in ("gravity", "physics/gravity") for each in world.findall(tag)), None
+    )
     whole = World(
         path=path,
         name=world.get("name") or "",
@@ -106,7 +124,9 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         gravity=GRAVITY if gravity is None else vector(numbers(gravity, 3)),
         models=models,
         version=root.get("version") or "",
-        anchors=frozenset(model.name for model in models if model.name in anchors or model.spans[0][0] in copied),
+        anchors=frozenset(
+            model.name for model in models if model.name in anchors or model.spans[0][0] in copied
+        ),
     )
     whole = context.recorded(whole)
     return _opened(whole, root, scope, context) if context.reading.inside else whole
@@ -126,7 +146,10 @@ def _opened(world: World, root: Element, scope: Scope, context: Context) -> Worl
     def solid(model: Model) -> list[Collision]:
         """What can be touched of a model. A mesh and its copy differ in their origin alone."""
         box = Box((0.0, 0.0, 0.0))
-        return [replace(one, shape=box) if isinstance(one.shape, Mesh) else one for one in model.collisions]
+        return [
+            replace(one, shape=box) if isinstance(one.shape, Mesh) else one
+            for one in model.collisions
+        ]
 
     while parts:
         text = with_copies(world.text, world.path, scope, list(parts.values()), context.resources)
@@ -153,14 +176,18 @@ def _models(scope: Scope, state: dict[str, list[Element]], context: Context) -> 
             context.note("ignored", part.at, "all that it includes is left out")
             continue
         if name != part.name:
-            context.note("replaced", part.at, f"its name, used {counts[part.name]} times, by '{name}'")
+            context.note(
+                "replaced", part.at, f"its name, used {counts[part.name]} times, by '{name}'"
+            )
         entries = state.get(part.name)
         entry = entries.pop(0) if entries else None
         try:
             models.append(assemble(part, name, scope, entry, context))
         except TooFar:
             # A world that was saved while it ran holds what had fallen out of it.
-            context.note("ignored", part.at, f"it is not simulated: it is more than {FARTHEST:g} m away")
+            context.note(
+                "ignored", part.at, f"it is not simulated: it is more than {FARTHEST:g} m away"
+            )
     context.model = ""
     for entry in chain(*state.values()):
         context.note("ignored", entry, f"the world has no model '{name_of(entry)}'")

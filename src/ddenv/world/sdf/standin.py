@@ -60,7 +60,9 @@ def parse_stand_ins(texts: Mapping[str, str]) -> dict[str, StandIn]:
     """The stand-ins of a scenario by the URI that they replace. Raises UserError."""
     found = {uri: parse_stand_in(text, f"stand-in for '{uri}'") for uri, text in texts.items()}
     if ALL_MISSING in found and found[ALL_MISSING] != AUTO:
-        raise UserError(f"stand-in for '{ALL_MISSING}': only {AUTO} can stand for all that is missing")
+        raise UserError(
+            f"stand-in for '{ALL_MISSING}': only {AUTO} can stand for all that is missing"
+        )
     return found
 
 
@@ -71,7 +73,9 @@ def parse_option(option: str) -> tuple[str, str]:
     uri, sign, text = option.rpartition("=")
     if not sign or not uri.strip():
         example = "model://barrel=cylinder:0.3,1.0"
-        raise UserError(f"--stand-in: expected URI=SHAPE, such as {example}, or auto; found '{option}'")
+        raise UserError(
+            f"--stand-in: expected URI=SHAPE, such as {example}, or auto; found '{option}'"
+        )
     uri = uri.strip()
     text = text.strip()
     parse_stand_in(text, "--stand-in")
@@ -159,9 +163,16 @@ def _box_of_inertia(link: Element) -> str | None:
     inertial = link.find("inertial")
     if inertial is None:
         return None
-    mass, x, y, z = (number_or_nan(inertial, path) for path in ("mass", "inertia/ixx", "inertia/iyy", "inertia/izz"))
+    mass, x, y, z = (
+        number_or_nan(inertial, path)
+        for path in ("mass", "inertia/ixx", "inertia/iyy", "inertia/izz")
+    )
     squares = [6 * (y + z - x), 6 * (x + z - y), 6 * (x + y - z)]
-    if not mass > 0 or x == y == z == DEFAULT_MOMENT or not all(1e-6 * mass < square < math.inf for square in squares):
+    if (
+        not mass > 0
+        or x == y == z == DEFAULT_MOMENT
+        or not all(1e-6 * mass < square < math.inf for square in squares)
+    ):
         return None
     sides = ",".join(f"{math.sqrt(square / mass):.3g}" for square in squares)
     return f"box:{sides}@0,0,0"

@@ -101,11 +101,17 @@ def link_of(source: Element, robot: Element, context: Context) -> Element:
             *(element("mass", mass, given(mass, "value")) for mass in inertial.findall("mass")[:1]),
         ]
         for tensor in inertial.findall("inertia")[:1]:
-            parts.append(twin(tensor, *(element(tag, tensor, given(tensor, tag)) for tag in TENSOR)))
+            parts.append(
+                twin(tensor, *(element(tag, tensor, given(tensor, tag)) for tag in TENSOR))
+            )
         made.append(twin(inertial, *parts))
     for tag in ("collision", "visual"):
         for count, part in enumerate(source.findall(tag)):
-            more = _surface(name_of(source), part, robot) if tag == "collision" else _material(part, robot)
+            more = (
+                _surface(name_of(source), part, robot)
+                if tag == "collision"
+                else _material(part, robot)
+            )
             own = part.get("name") or f"{tag}_{count}"
             made.append(twin(part, pose(part), _geometry(part, context), *more, name=own))
     return made
@@ -124,7 +130,9 @@ def _geometry(part: Element, context: Context) -> Element:
         if tag == "uri" and text.startswith("package://") and context.stand_in(text) is None:
             # It may be in the package that contains the robot's file.
             package, _, rest = text.removeprefix("package://").partition("/")
-            folders = (folder for folder in shape.source.absolute().parents if folder.name == package)
+            folders = (
+                folder for folder in shape.source.absolute().parents if folder.name == package
+            )
             text = next((str(folder / rest) for folder in folders), text)
         made.append(element(tag, shape, text))
     if shape.tag == "mesh" and shape.get("scale"):
@@ -142,7 +150,9 @@ def _surface(link: str, part: Element, robot: Element) -> list[Element]:
     ]
     friction = element("friction", part, "", element("ode", part, "", *coefficients))
     surface = [element("surface", part, "", friction)] if coefficients else []
-    return surface + [_drake_properties(own) for own in part.findall("drake:proximity_properties")[:1]]
+    return surface + [
+        _drake_properties(own) for own in part.findall("drake:proximity_properties")[:1]
+    ]
 
 
 def _drake_properties(own: Element) -> Element:
@@ -154,7 +164,12 @@ def _drake_properties(own: Element) -> Element:
 def _material(part: Element, robot: Element) -> list[Element]:
     """The `<material>` of a visual: its own colour, or that of the robot's material of the same name."""
     own = part.findall("material")[:1]
-    named = [other for one in own for other in robot.findall("material") if other.get("name") == one.get("name")]
+    named = [
+        other
+        for one in own
+        for other in robot.findall("material")
+        if other.get("name") == one.get("name")
+    ]
     colors = [color for each in (*own, *named) for color in each.findall("color")[:1]]
     return [twin(own[0], element("diffuse", color, given(color, "rgba"))) for color in colors[:1]]
 
@@ -174,7 +189,9 @@ def joint_of(source: Element, parent: str, child: str) -> Element:
     """The SDF joint for a URDF one. Raises UserError."""
     kind = source.get("type", "").strip()
     if kind not in KINDS:
-        raise complain(source, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
+        raise complain(
+            source, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})"
+        )
     ends = element("parent", source, parent), element("child", source, child)
     made = twin(source, *ends, name=name_of(source), type=kind)
     if kind == "fixed":
@@ -196,7 +213,9 @@ def joint_of(source: Element, parent: str, child: str) -> Element:
     return made
 
 
-def element(tag: str, source: Element, text: str = "", *children: Element, **attributes: str) -> Element:
+def element(
+    tag: str, source: Element, text: str = "", *children: Element, **attributes: str
+) -> Element:
     """An SDF element with `text` and `children`, at the position of `source` in the file and with it as parent."""
     made = Element(tag, attributes)
     made.text = text
@@ -236,5 +255,9 @@ def pose(source: Element, relative_to: str = "") -> Element:
     """The `<pose>` for the `<origin>` in `source`. Raises UserError."""
     origin = source.find("origin")
     holder = source if origin is None else origin
-    words = "0 0 0 0 0 0" if origin is None else f"{three(origin, 'xyz', '0 0 0')} {three(origin, 'rpy', '0 0 0')}"
+    words = (
+        "0 0 0 0 0 0"
+        if origin is None
+        else f"{three(origin, 'xyz', '0 0 0')} {three(origin, 'rpy', '0 0 0')}"
+    )
     return element("pose", holder, words, **({"relative_to": relative_to} if relative_to else {}))

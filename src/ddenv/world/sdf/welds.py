@@ -20,7 +20,15 @@ from ddenv.world.model import Joint, Link, Model, Shared, World, held_with
 from ddenv.world.pose import HERE, Pose, turn, vector
 from ddenv.world.sdf.assemble import assemble, still
 from ddenv.world.sdf.context import Context
-from ddenv.world.sdf.directives import WORLD, WORLD_INSTANCE, Directive, Source, Span, opened, spans_of
+from ddenv.world.sdf.directives import (
+    WORLD,
+    WORLD_INSTANCE,
+    Directive,
+    Source,
+    Span,
+    opened,
+    spans_of,
+)
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.includes import included
 from ddenv.world.sdf.joints import check_tree
@@ -65,7 +73,9 @@ class _Builder:
     models: dict[str, Model] = field(default_factory=dict)
     elements: dict[str, Element] = field(default_factory=dict)
     scopes: dict[int, Scope] = field(default_factory=dict)
-    frames: dict[str, Frame] = field(default_factory=lambda: {f"{WORLD_INSTANCE}::{WORLD}": Frame()})
+    frames: dict[str, Frame] = field(
+        default_factory=lambda: {f"{WORLD_INSTANCE}::{WORLD}": Frame()}
+    )
     instances: set[str] = field(default_factory=lambda: {WORLD_INSTANCE})
     # By model and link.
     groups: dict[tuple[str, str], Group] = field(default_factory=dict)
@@ -94,8 +104,18 @@ class _Builder:
                 parent, child = (self._frame(keys[end], source) for end in ("parent", "child"))
                 _, pose = source.pose(keys.get("X_PC"), with_base=False)
                 if not child.model:
-                    raise source.complain(keys["child"], "the world cannot be welded to a model; make it the parent")
-                self._fix(Fixing(own=child, base=parent, pose=pose, complain=partial(source.complain, one.node), weld=True))
+                    raise source.complain(
+                        keys["child"], "the world cannot be welded to a model; make it the parent"
+                    )
+                self._fix(
+                    Fixing(
+                        own=child,
+                        base=parent,
+                        pose=pose,
+                        complain=partial(source.complain, one.node),
+                        weld=True,
+                    )
+                )
                 for owner in child.owners:
                     self.spans[owner].append(one.span)
             case "add_collision_filter_group":
@@ -141,7 +161,9 @@ class _Builder:
         self.spans[name].append(one.span)
         for own, pose, held in _frames(outer.inside(part), outer.placed(part), ""):
             if own != OWN_FRAME or not is_urdf(part.element):
-                self.frames[f"{name}::{own}"] = Frame(name, held, turned.get(held, HERE) @ pose, frozenset([name]))
+                self.frames[f"{name}::{own}"] = Frame(
+                    name, held, turned.get(held, HERE) @ pose, frozenset([name])
+                )
                 self.instances.add(f"{name}::{own}".rpartition("::")[0])
         # By joints, but for those to the world.
         parents = {joint.child: joint.parent for joint in model.joints if joint.parent != WORLD}
@@ -156,12 +178,24 @@ class _Builder:
                 raise source.complain(value, f"there is no body '{body}' in '{name}'")
             base, pose = source.pose(value)
             there = Frame() if base is None else self._frame(base, source)
-            self._fix(Fixing(own=frame, base=there, pose=pose, complain=partial(source.complain, value), weld=False))
+            self._fix(
+                Fixing(
+                    own=frame,
+                    base=there,
+                    pose=pose,
+                    complain=partial(source.complain, value),
+                    weld=False,
+                )
+            )
 
     def _frame(self, node: Node, source: Source) -> Frame:
         """The frame that `node` names. Raises UserError."""
         name = source.name_of(node)
-        found = [each for each in self.frames if name == (each if "::" in name else each.rpartition("::")[2])]
+        found = [
+            each
+            for each in self.frames
+            if name == (each if "::" in name else each.rpartition("::")[2])
+        ]
         if not found:
             hint = nearest(name, self.frames)
             raise source.complain(node, f"there is no frame '{name}' here{hint}")
@@ -182,7 +216,11 @@ class _Builder:
             if instance not in self.instances:
                 raise source.complain(one.keys["name"], f"there is no model instance '{instance}'")
             words = instance.split("::")
-            owners |= {name for end in range(len(words)) if (name := "::".join(words[: end + 1])) in self.models}
+            owners |= {
+                name
+                for end in range(len(words))
+                if (name := "::".join(words[: end + 1])) in self.models
+            }
         else:
             inner = there.link.rpartition("::")[0]
             instance = "::".join(each for each in (there.model or WORLD_INSTANCE, inner) if each)
@@ -252,7 +290,9 @@ class _Builder:
                 continue
             at = fixing.own.link
             joints = _hung_from(at, joints)
-            weld = Joint(name=f"{at} (weld)", kind="fixed", parent=WORLD, child=at, pose=self._pose(base))
+            weld = Joint(
+                name=f"{at} (weld)", kind="fixed", parent=WORLD, child=at, pose=self._pose(base)
+            )
             if base.model == name:
                 joints.append(replace(weld, parent=base.link))
             elif base.model and not _holds(self.finish(base.model), base.link):
@@ -275,8 +315,14 @@ class _Builder:
             self.ties |= dict.fromkeys((name, other) for other in sorted(others))
         links = tuple(_moved_link(link, place[link.name]) for link in model.links)
         pose = place[model.links[0].name] @ model.pose
-        model = replace(model, pose=pose, links=links, joints=tuple(joints), spans=tuple(self.spans[name]))
-        if name not in self.carriers and not model.static and all(_holds(model, link.name) for link in links):
+        model = replace(
+            model, pose=pose, links=links, joints=tuple(joints), spans=tuple(self.spans[name])
+        )
+        if (
+            name not in self.carriers
+            and not model.static
+            and all(_holds(model, link.name) for link in links)
+        ):
             return still(model)
         return model
 
@@ -297,7 +343,10 @@ class _Builder:
             ]
             made[outer] = replace(
                 whole,
-                links=(*whole.links, *(replace(link, name=f"{name}::{link.name}") for link in part.links)),
+                links=(
+                    *whole.links,
+                    *(replace(link, name=f"{name}::{link.name}") for link in part.links),
+                ),
                 joints=(*whole.joints, *joints, weld),
                 spans=(*whole.spans, *part.spans),
             )
@@ -322,7 +371,10 @@ class _Builder:
         before: dict[str, frozenset[str]] = {}
         while before != owners:
             before = owners
-            owners = {name: owners[name] | self._owners(one, "member_groups", owners) for name, one in groups.items()}
+            owners = {
+                name: owners[name] | self._owners(one, "member_groups", owners)
+                for name, one in groups.items()
+            }
         for name, one in groups.items():
             if not owners[name]:
                 raise one.source.complain(one.node, "a group needs members or member_groups")
@@ -332,15 +384,23 @@ class _Builder:
                 if key.value == "name":
                     continue
                 for node, inner in spans_of(one.source, listed):
-                    yield Shared(one.source.bytes_of(inner), self._owner(node, key.value, one.source, owners))
+                    yield Shared(
+                        one.source.bytes_of(inner), self._owner(node, key.value, one.source, owners)
+                    )
                 if names := self._owners(one, key.value, owners):
                     yield Shared(one.source.bytes_of(span), names)
 
-    def _owners(self, one: Directive, key: str, groups: Mapping[str, frozenset[str]]) -> frozenset[str]:
+    def _owners(
+        self, one: Directive, key: str, groups: Mapping[str, frozenset[str]]
+    ) -> frozenset[str]:
         nodes = one.source.items(one.keys.get(key))
-        return frozenset[str]().union(*(self._owner(node, key, one.source, groups) for node in nodes))
+        return frozenset[str]().union(
+            *(self._owner(node, key, one.source, groups) for node in nodes)
+        )
 
-    def _owner(self, node: Node, key: str, source: Source, groups: Mapping[str, frozenset[str]]) -> frozenset[str]:
+    def _owner(
+        self, node: Node, key: str, source: Source, groups: Mapping[str, frozenset[str]]
+    ) -> frozenset[str]:
         """The models of a member, which is a body, or of a group. Raises UserError."""
         if key == "members":
             return frozenset(map(self.carrier, self._frame(node, source).owners))
@@ -364,9 +424,17 @@ def parse_directives(text: bytes, path: Path, context: Context) -> World:
     context.complain_of_missing()
     if flat is not None:
         # Again, for the places in that text; what is wrong was said with the places in the files.
-        return parse_directives(flat, path, Context(resources=context.resources, reading=context.reading))
-    going = {span for spans in builder.spans.values() for span in spans} | {one.span for one in builder.filters}
-    if models and text[found[0].span[0] :].startswith(b"-") and all(one.span in going for one in found):
+        return parse_directives(
+            flat, path, Context(resources=context.resources, reading=context.reading)
+        )
+    going = {span for spans in builder.spans.values() for span in spans} | {
+        one.span for one in builder.filters
+    }
+    if (
+        models
+        and text[found[0].span[0] :].startswith(b"-")
+        and all(one.span in going for one in found)
+    ):
         # Drake takes an empty list, but not a missing one.
         span = found[0].span[0], found[-1].span[1]
         shared.append(Shared(span, frozenset(model.name for model in models), b"\n  []"))
@@ -398,7 +466,11 @@ def _element(tag: str, path: Path, line: int = 1, span: Span = (0, 0)) -> Elemen
 
 def _frames(scope: Scope, here: Pose, prefix: str) -> Iterator[tuple[str, Pose, str]]:
     """The links and frames of a model and of those inside it: name, pose where the file puts it, and link."""
-    named = [name for name, one in scope.named.items() if isinstance(one, Element) and one.tag in ("link", "frame")]
+    named = [
+        name
+        for name, one in scope.named.items()
+        if isinstance(one, Element) and one.tag in ("link", "frame")
+    ]
     for name in (OWN_FRAME, *named):
         link = scope.link(name, scope.element)
         if link is not None:
@@ -407,7 +479,9 @@ def _frames(scope: Scope, here: Pose, prefix: str) -> Iterator[tuple[str, Pose, 
         yield from _frames(scope.inside(part), here @ scope.placed(part), f"{prefix}{part.name}::")
 
 
-def _at_positions(model: Model, positions: Mapping[str, Node], source: Source) -> tuple[Model, dict[str, Pose]]:
+def _at_positions(
+    model: Model, positions: Mapping[str, Node], source: Source
+) -> tuple[Model, dict[str, Pose]]:
     """`model` with joints at `positions` (rad, or m), and how far each link moves. Raises UserError."""
     joints = {joint.name: joint for joint in model.joints}
     at: dict[str, float] = {}
@@ -448,7 +522,9 @@ def _moved_link(link: Link, by: Pose) -> Link:
     inertia = None if link.inertia is None else replace(link.inertia, pose=by @ link.inertia.pose)
     collisions = tuple(replace(one, pose=by @ one.pose) for one in link.collisions)
     visuals = tuple(replace(one, pose=by @ one.pose) for one in link.visuals)
-    return replace(link, pose=by @ link.pose, inertia=inertia, collisions=collisions, visuals=visuals)
+    return replace(
+        link, pose=by @ link.pose, inertia=inertia, collisions=collisions, visuals=visuals
+    )
 
 
 def _moved_joint(joint: Joint, by: Pose, position: float = 0.0) -> Joint:
@@ -456,7 +532,14 @@ def _moved_joint(joint: Joint, by: Pose, position: float = 0.0) -> Joint:
     second = None if joint.axis2 is None else by.rotate(joint.axis2)
     lower = joint.lower - position
     upper = joint.upper - position
-    return replace(joint, pose=by @ joint.pose, axis=by.rotate(joint.axis), axis2=second, lower=lower, upper=upper)
+    return replace(
+        joint,
+        pose=by @ joint.pose,
+        axis=by.rotate(joint.axis),
+        axis2=second,
+        lower=lower,
+        upper=upper,
+    )
 
 
 def _hung_from(link: str, joints: list[Joint]) -> list[Joint]:

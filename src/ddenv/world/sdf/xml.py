@@ -35,7 +35,9 @@ def tag_end(text: bytes, element: Element) -> int:
 
 def with_words(text: bytes, element: Element, words: str) -> Edit:
     """`element` with other words in it."""
-    start = text[element.start : tag_end(text, element)].removesuffix(b">").removesuffix(b"/").rstrip()
+    start = (
+        text[element.start : tag_end(text, element)].removesuffix(b">").removesuffix(b"/").rstrip()
+    )
     return element.start, element.end, start + f">{words}</{element.tag}>".encode()
 
 
@@ -61,7 +63,9 @@ def place(element: Element) -> str:
     node: Element | None = element
     while node is not None:
         name = node.get("name")
-        steps.append(node.tag if name is None or node.tag == "world" else f"{node.tag}[@name='{name[:80]}']")
+        steps.append(
+            node.tag if name is None or node.tag == "world" else f"{node.tag}[@name='{name[:80]}']"
+        )
         node = node.parent
     return f"{element.source}:{element.line}: /{'/'.join(reversed(steps))}"
 
