@@ -1,9 +1,10 @@
-"""How much sooner a reduction ends with more workers, and how many tests that costs: the real engine, tests that take no time.
+"""How much sooner a reduction ends with more workers, and how many tests that costs: the real
+engine, tests that take no time.
 
 python benchmarks/cluster.py [--models 200] [--workers 1,8,64,512]
 
-Time is simulated: a test takes 20 to 60 s of it, its start and its way back nothing. What the engine itself takes is real, and
-shown.
+Time is simulated: a test takes 20 to 60 s of it, its start and its way back nothing. What the
+engine itself takes is real, and shown.
 """
 
 from __future__ import annotations
@@ -90,8 +91,8 @@ class Simulated:
 
 
 def reduce(folder: Path, models: int, workers: int) -> tuple[Simulated, float, int, int]:
-    """A reduction with so many workers: its pool, the real s that it took, how many models are left, and how many tests no verdict
-    rests on.
+    """A reduction with so many workers: its pool, the real s that it took, how many models are
+    left, and how many tests no verdict rests on.
     """
     path = folder / f"{models}-{workers}.ddenv"
     world = folder / f"crates-{models}.sdf"

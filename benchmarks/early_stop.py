@@ -1,15 +1,18 @@
 """Runs the robot in random parts of worlds, each seed both ways: with early stop, and to the end.
 
-    python benchmarks/early_stop.py [--scenario ditch] [--world FILE:SPAWN:GOAL ...] [--environments N] [--seeds S]
+    python benchmarks/early_stop.py [--scenario ditch] [--world FILE:SPAWN:GOAL ...] [--environments
+    N] [--seeds S]
                                     [--seconds N] [--jobs N]
 
-A world is any SDF file, with x,y,z,yaw of the start and x,y of the goal: `arena.world:-8,0,0.4,0:7.5,0.5`. What it
-lacks is stood in for; `--model-path` has folders with models.
+A world is any SDF file, with x,y,z,yaw of the start and x,y of the goal:
+`arena.world:-8,0,0.4,0:7.5,0.5`. What it lacks is stood in for; `--model-path` has folders with
+models.
 
-f is fixed from baseline runs of the whole world, as a reduction does it. A verdict differs if early stop changes the
-outcome of a run: similar, other or pass. The parts are of all sizes, from a single model to all. A run that does not
-end early is not made again: it is the run to its end. Of a run that does, the longer one has to begin with its bits;
-`moved` is how far the robot still moved then, at most.
+f is fixed from baseline runs of the whole world, as a reduction does it. A verdict differs if early
+stop changes the outcome of a run: similar, other or pass. The parts are of all sizes, from a single
+model to all. A run that does not end early is not made again: it is the run to its end. Of a run
+that does, the longer one has to begin with its bits; `moved` is how far the robot still moved then,
+at most.
 """
 
 import argparse
@@ -62,7 +65,8 @@ def main() -> None:
     scenarios = [load_scenario(find_scenario(name)) for name in options.scenario]
     scenarios += [of_world(text, options.model_path, options.time_step) for text in options.world]
     print(
-        "| world | tests | ended early | verdicts that differ | at most (95 %) | moved | simulated time |"
+        "| world | tests | ended early | verdicts that differ | at most (95 %) | moved | "
+        "simulated time |"
     )
     print("|---|---|---|---|---|---|---|", flush=True)
     total: list[tuple[Both, Failure]] = []
@@ -97,7 +101,8 @@ def measured(scenario: Scenario, options: argparse.Namespace) -> list[tuple[Both
     with multiprocessing.get_context("spawn").Pool(options.jobs, prepare, (scenario,)) as pool:
         failure = fixed(scenario, pool.starmap(full_run, whole))
         jobs = ((one, ends_of([failure])) for one in in_time(asked, until))
-        # Jobs are taken from the list as fast as they are made only where the pool is asked for few at a time.
+        # Jobs are taken from the list as fast as they are made only where the pool is asked for few
+        # at a time.
         pairs = []
         while batch := list(islice(jobs, options.jobs)):
             pairs += pool.starmap(both_runs, batch)
@@ -184,7 +189,10 @@ def row(name: str, tested: list[tuple[Both, Failure]]) -> str:
     way = f"{max(map(moved, cut)):.3f} m" if cut else "-"
     full_time, early_time = (sum(pair[kind].simulated_seconds for pair in pairs) for kind in (0, 1))
     saved = f"{1 - early_time / full_time:.0%} less" if pairs else "-"
-    return f"| {name} | {len(pairs)} | {len(cut)} | {wrong} ({kinds} kinds) | {most} | {way} | {saved} |"
+    return (
+        f"| {name} | {len(pairs)} | {len(cut)} | {wrong} ({kinds} kinds) | {most} | {way} | "
+        f"{saved} |"
+    )
 
 
 if __name__ == "__main__":

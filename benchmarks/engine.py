@@ -1,11 +1,13 @@
-"""What the engine itself costs: the time from a test's end to the next one's start, its own work for each test, and its resume.
+"""What the engine itself costs: the time from a test's end to the next one's start, its own work
+for each test, and its resume.
 
     python benchmarks/engine.py [--robot]
 
-The real engine and its worker processes, with tests that take no time or only sleep. *Between tests* is the time from the end of a
-test in a worker to the start of its next one; *own work* the CPU time of the engine's process for each test, after its start. The
-times are p50 / mean / p95. `--robot` compares two workers with one on the scenario `friction`, and two of Dask on this machine with
-two plain ones, which takes minutes.
+The real engine and its worker processes, with tests that take no time or only sleep. *Between
+tests* is the time from the end of a test in a worker to the start of its next one; *own work* the
+CPU time of the engine's process for each test, after its start. The times are p50 / mean / p95.
+`--robot` compares two workers with one on the scenario `friction`, and two of Dask on this machine
+with two plain ones, which takes minutes.
 """
 
 from __future__ import annotations
@@ -116,14 +118,17 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             print(row(Path(folder), seconds, models, jobs, more), flush=True)
     print(
-        f"\n| tests in the run | resumed after, s |\n|---|---|\n| {options.long:,} | {resumed(options.long):.2f} |"
+        f"\n| tests in the run | resumed after, s |\n|---|---|\n| {options.long:,} | "
+        f"{resumed(options.long):.2f} |"
     )
     if options.robot:
         robot()
 
 
 def robot() -> None:
-    """Prints how many tests of friction are made in a minute. A LocalCluster wants the guard of `__main__` that this file has."""
+    """Prints how many tests of friction are made in a minute. A LocalCluster wants the guard of
+    `__main__` that this file has.
+    """
     from distributed import LocalCluster
 
     one, two = speed(1), speed(2)
@@ -151,7 +156,9 @@ def row(folder: Path, seconds: float, models: int, jobs: int, more: dict[str, ob
 
 
 def work(run: Path, jobs: int, make: partial[Sleeper]) -> float:
-    """Reduces as the engine program does, in this process. Returns its own CPU time after its start, s."""
+    """Reduces as the engine program does, in this process. Returns its own CPU time after its
+    start, s.
+    """
     with RunFile(run) as file:
         scenario, world, robot = read_parts(file)
         file.own()

@@ -1,10 +1,11 @@
-"""How often the robot fails in the scenarios that come with ddenv, and in the same worlds with the cause taken away.
+"""How often the robot fails in the scenarios that come with ddenv, and in the same worlds with the
+cause taken away.
 
     python benchmarks/failure_rates.py [--seeds N] [--jobs N] [--scenarios ditch,rubble,friction]
 
-Repaired worlds: the ditch is filled, the cinder blocks of the rubble are gone, all patches are as rough as the asphalt. A run
-failed if it did not reach the goal; it shows f if it ended within epsilon of the failed run that has most others there. Intervals
-are Wilson's, 95 %.
+Repaired worlds: the ditch is filled, the cinder blocks of the rubble are gone, all patches are as
+rough as the asphalt. A run failed if it did not reach the goal; it shows f if it ended within
+epsilon of the failed run that has most others there. Intervals are Wilson's, 95 %.
 """
 
 import argparse

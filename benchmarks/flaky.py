@@ -1,10 +1,12 @@
-"""What a reduction is worth when the failure does not show in every run: does its end keep the rate, and is that what it says?
+"""What a reduction is worth when the failure does not show in every run: does its end keep the
+rate, and is that what it says?
 
     python benchmarks/flaky.py [--reductions N] [--jobs N] [--only TEXT] [--algorithm NAME]
 
-Models on a line, without a robot; those near the place of the failure are likelier to be needed. Each oracle knows the true rate of
-the failure in every selection of models, and draws each run independently. `first` takes what shows the failure once in four runs,
-as the paper does, and has no certificate; `kept` is the default of `ddenv.reduce`.
+Models on a line, without a robot; those near the place of the failure are likelier to be needed.
+Each oracle knows the true rate of the failure in every selection of models, and draws each run
+independently. `first` takes what shows the failure once in four runs, as the paper does, and has no
+certificate; `kept` is the default of `ddenv.reduce`.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Oracle:
-    """The true rate of the failure in each selection. Without one of `needed` it (nearly) never shows; those `useful` raise it."""
+    """The true rate of the failure in each selection. Without one of `needed` it (nearly) never
+    shows; those `useful` raise it.
+    """
 
     rate: Callable[[frozenset[str]], float]
     needed: frozenset[str]
@@ -36,7 +40,9 @@ class Oracle:
 
 
 def steady(rate: float, needed: int, spurious: float = 0.0) -> Callable[[list[str]], Oracle]:
-    """The same rate with all needed models, and another failure in the same place in a share `spurious` of all runs."""
+    """The same rate with all needed models, and another failure in the same place in a share
+    `spurious` of all runs.
+    """
 
     def make(drawn: list[str]) -> Oracle:
         all_needed = frozenset(drawn[:needed])
@@ -49,7 +55,9 @@ def steady(rate: float, needed: int, spurious: float = 0.0) -> Callable[[list[st
 
 
 def drifting(low: float) -> Callable[[list[str]], Oracle]:
-    """Needs one model; one of two boards is enough to show the failure at a low rate, both show it always."""
+    """Needs one model; one of two boards is enough to show the failure at a low rate, both show it
+    always.
+    """
 
     def make(drawn: list[str]) -> Oracle:
         needed, boards = frozenset(drawn[:1]), frozenset(drawn[1:3])
@@ -123,7 +131,9 @@ class Task:
 
 
 def reduction(task: Task) -> list[float]:
-    """One value for each of `COLUMNS`; where no claim says anything of the kind, the value is nan."""
+    """One value for each of `COLUMNS`; where no claim says anything of the kind, the value is
+    nan.
+    """
     n, make = ORACLES[task.oracle]
     rng = np.random.default_rng([task.seed, *task.oracle.encode()])
     names = [f"m{index}" for index in range(n)]

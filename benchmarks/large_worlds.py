@@ -16,7 +16,8 @@ from ddenv.world.scenario import Scenario
 SIZE, MASS = (0.9, 0.09, 0.04), 2.0  # of a board, m and kg
 GAP = 2.0  # m between the middles of two things
 CRATE, WALL = (0.8, 0.8, 0.8), (1.8, 0.2, 1.2)  # m
-# No thing is nearer to the straight way to the goal than this, and none to a model of the scenario than that, m.
+# No thing is nearer to the straight way to the goal than this, and none to a model of the scenario
+# than that, m.
 CLEAR, APART = 7.0, 1.5
 # One place in so many has a wall, and one in so many a pile of three boards.
 WALLS, PILES = 20, 400
@@ -25,7 +26,9 @@ ABOVE = 0.02
 
 
 def among_things(scenario: Scenario, world: World, models: int) -> bytes:
-    """The text of the `world` of a scenario with things around it, nearest first, so that it has `models` elements in all."""
+    """The text of the `world` of a scenario with things around it, nearest first, so that it has
+    `models` elements in all.
+    """
     missing = models - len(world.elements())
     text = "".join(text for _, text in zip(range(missing), things(scenario, world), strict=False))
     return world.text.replace(b"</world>", text.encode() + b"</world>")
@@ -48,7 +51,9 @@ def things(scenario: Scenario, world: World) -> Iterator[str]:
 
 
 def places(scenario: Scenario, world: World) -> Iterator[tuple[float, float]]:
-    """Places on a grid, nearest to the straight way first, that are clear of it and of all models."""
+    """Places on a grid, nearest to the straight way first, that are clear of it and of all
+    models.
+    """
     spawn, goal = scenario.robot.spawn, scenario.goal
     way = Region.of((spawn.x, spawn.y), (goal.x, goal.y), ())
     found = (box for model in world.models if (box := model_bounds(model)) is not None)
@@ -83,7 +88,10 @@ def still(
     """A box that never moves and stands on `z` (m)."""
     box = f"<box><size>{size[0]} {size[1]} {size[2]}</size></box>"
     link = f'<link name="link"><collision name="box"><geometry>{box}</geometry></collision></link>'
-    return f'<model name="{name}"><static>true</static><pose>{x} {y} {z + size[2] / 2} 0 0 {yaw}</pose>{link}</model>\n'
+    return (
+        f'<model name="{name}"><static>true</static><pose>{x} {y} {z + size[2] / 2} 0 0 '
+        f"{yaw}</pose>{link}</model>\n"
+    )
 
 
 def board(number: int, x: float, y: float, z: float, yaw: float) -> str:
@@ -99,7 +107,9 @@ def board(number: int, x: float, y: float, z: float, yaw: float) -> str:
         for name, value in zip(("ixx", "iyy", "izz"), inertia, strict=True)
     )
     return (
-        f'<model name="board_{number}"><pose>{x} {y} {z} 0 0 {yaw}</pose><link name="link"><inertial><mass>{MASS}</mass>'
-        f'<inertia>{moments}</inertia></inertial><collision name="c"><geometry><box><size>{a} {b} {c}</size></box></geometry>'
+        f'<model name="board_{number}"><pose>{x} {y} {z} 0 0 {yaw}</pose><link '
+        f'name="link"><inertial><mass>{MASS}</mass>'
+        f'<inertia>{moments}</inertia></inertial><collision name="c"><geometry><box><size>{a} '
+        f"{b} {c}</size></box></geometry>"
         "</collision></link></model>"
     )

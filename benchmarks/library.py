@@ -2,13 +2,15 @@
 
     python benchmarks/library.py [--worlds N] [--only TEXT] [--jobs N]
 
-Worlds of 43, 100 and 200 models of which 2 or 5 are needed, without a robot (see tests_needed.py). A row is a kind of failure, a
-column an algorithm: the calls of the test until it ended, mean (worst); in how many % of the worlds all needed models are left,
-and nothing needless; the share of the failure rate that is really kept, and in how many % the result says that it is not shown.
+Worlds of 43, 100 and 200 models of which 2 or 5 are needed, without a robot (see tests_needed.py).
+A row is a kind of failure, a column an algorithm: the calls of the test until it ended, mean
+(worst); in how many % of the worlds all needed models are left, and nothing needless; the share of
+the failure rate that is really kept, and in how many % the result says that it is not shown.
 
-Shrink Ray needs Python 3.12. It reduces a file with a model in each line, in this process, with its handling of flaky tests, and
-by its deletion of lines alone: all else has no use for a list of names. Candidates that are no such list count as no calls. It
-needs neither Drake nor a language model here:
+Shrink Ray needs Python 3.12. It reduces a file with a model in each line, in this process, with its
+handling of flaky tests, and by its deletion of lines alone: all else has no use for a list of
+names. Candidates that are no such list count as no calls. It needs neither Drake nor a language
+model here:
 
     pip install --no-deps shrinkray
     pip install attrs chardet click humanize libcst numpy tree-sitter tree-sitter-language-pack trio
@@ -45,8 +47,9 @@ Test = Callable[[frozenset[str]], bool]
 
 @dataclass(frozen=True)
 class Failure:
-    """The failure shows at `rate` where all needed models are there, `less` times as often without each of five more, and at the
-    rate `second` elsewhere. Without two boards together it shows `drifts` times as often.
+    """The failure shows at `rate` where all needed models are there, `less` times as often without
+    each of five more, and at the rate `second` elsewhere. Without two boards together it shows
+    `drifts` times as often.
     """
 
     rate: float
@@ -141,7 +144,8 @@ def by_shrink_ray(world: World, test: Test, seed: int) -> Ending:
     reducer = ShrinkRay(
         target=problem,
         initial_cuts=[],
-        # One line after the other, larger blocks as that succeeds. Its blocks of all sizes took twenty times as many calls.
+        # One line after the other, larger blocks as that succeeds. Its blocks of all sizes took
+        # twenty times as many calls.
         great_passes=[compose(Split(b"\n"), delete_elements)],
         ok_passes=[],
         last_ditch_passes=[],
@@ -158,7 +162,8 @@ def by_shrink_ray(world: World, test: Test, seed: int) -> Ending:
 
 
 def one(task: Task) -> tuple[float, ...] | None:
-    """Calls, whether the needed models are left, whether nothing needless is, the share of the rate, whether that is not shown.
+    """Calls, whether the needed models are left, whether nothing needless is, the share of the
+    rate, whether that is not shown.
 
     None where the failure did not show.
     """
@@ -203,7 +208,10 @@ def cell(results: list[tuple[float, ...] | None]) -> str:
     calls, needed, nothing_needless, share, not_shown = (
         list(column) for column in zip(*ended, strict=True)
     )
-    words = f"{fmean(calls):,.0f} ({max(calls):,}) {100 * fmean(needed):.0f}/{100 * fmean(nothing_needless):.0f}"
+    words = (
+        f"{fmean(calls):,.0f} ({max(calls):,}) "
+        f"{100 * fmean(needed):.0f}/{100 * fmean(nothing_needless):.0f}"
+    )
     words += f" {fmean(share):.2f}"
     words += f", {100 * fmean(not_shown):.0f} % not shown" if any(not_shown) else ""
     refused = len(results) - len(ended)

@@ -2,9 +2,9 @@
 
 python benchmarks/long_run.py FILE [--tests N] [--models N]
 
-The models stand in rows on a square, and the robot gets stuck in their middle. Every round has 50 partitions of neighbours;
-each of its candidates but the last is run four times (once and three re-runs) and does not show f; the last one, which is
-without the last partition, does.
+The models stand in rows on a square, and the robot gets stuck in their middle. Every round has 50
+partitions of neighbours; each of its candidates but the last is run four times (once and three
+re-runs) and does not show f; the last one, which is without the last partition, does.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ ROBOT_SDF = (
     "<box><size>0.6 0.4 0.2</size></box></geometry></collision></link></model></sdf>"
 )
 GROUND = (
-    '<model name="ground_plane"><static>true</static><link name="link"><collision name="plane"><geometry>'
+    '<model name="ground_plane"><static>true</static><link name="link"><collision '
+    'name="plane"><geometry>'
     "<plane><normal>0 0 1</normal></plane></geometry></collision></link></model>"
 )
 
@@ -87,8 +88,10 @@ def write(path: Path, tests: int, models: int) -> None:
 def world_of(models: int) -> str:
     row = math.ceil(math.sqrt(models))
     boxes = (
-        f'<model name="crate {number}"><static>true</static><pose>{number % row} {number // row} 0.25 0 0 {number % 3}</pose>'
-        f'<link name="link"><collision name="box"><geometry><box><size>0.5 0.4 0.5</size></box></geometry></collision>'
+        f'<model name="crate {number}"><static>true</static><pose>{number % row} {number // row} '
+        f"0.25 0 0 {number % 3}</pose>"
+        '<link name="link"><collision name="box"><geometry><box><size>0.5 0.4 '
+        "0.5</size></box></geometry></collision>"
         f"</link></model>"
         for number in range(models)
     )

@@ -1,4 +1,6 @@
-"""Programs that are measured: in a terminal of their own (a pty of 120x36 with 16 million colours), and their memory."""
+"""Programs that are measured: in a terminal of their own (a pty of 120x36 with 16 million colours),
+and their memory.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ ESCAPES = re.compile(rb"\x1b[\]P_][^\x07\x1b]*(?:\x07|\x1b\\)|\x1b\[[0-9;:<=>?$ 
 
 
 class Terminal:
-    """Starts `words` in a terminal. Times are those of `time.perf_counter`, s; `started` is just before the program is."""
+    """Starts `words` in a terminal. Times are those of `time.perf_counter`, s; `started` is just
+    before the program is.
+    """
 
     def __init__(self, words: list[str], environment: dict[str, str]) -> None:
         columns, rows = SIZE
@@ -35,7 +39,9 @@ class Terminal:
             os.execvpe(words[0], words, environment | KIND)
 
     def look(self, seconds: float) -> bool:
-        """Waits a limited time for output, and reads it. Raises EOFError when the program is gone."""
+        """Waits a limited time for output, and reads it. Raises EOFError when the program is
+        gone.
+        """
         if not select.select([self._handle], [], [], max(0.0, seconds))[0]:
             return False
         try:

@@ -1,11 +1,14 @@
-"""What whole reductions cost: of the scenarios with each pair, and where most models of a world take no part.
+"""What whole reductions cost: of the scenarios with each pair, and where most models of a world
+take no part.
 
-    python benchmarks/reductions.py [--scenarios ditch,friction] [--pairs paper] [--search-only] [--jobs N] [SETTING=VALUE ...]
-    python benchmarks/reductions.py --models 500,5000 --pairs own [--jobs N] [--keep FOLDER]
+    python benchmarks/reductions.py [--scenarios ditch,friction] [--pairs paper] [--search-only]
+    [--jobs N] [SETTING=VALUE ...] python benchmarks/reductions.py --models 500,5000 --pairs own
+    [--jobs N] [--keep FOLDER]
 
-An engine reduces each world. *Search* counts the tests that it simulates, the baseline included and the certificate apart; *all*
-the certificate, too. *CPU* is the time of all processes, *memory* the largest sum over them; a page that several share counts once.
-`--search-only` stops where the certificate begins. `--models` puts each scenario among crates, walls and piles of boards
+An engine reduces each world. *Search* counts the tests that it simulates, the baseline included and
+the certificate apart; *all* the certificate, too. *CPU* is the time of all processes, *memory* the
+largest sum over them; a page that several share counts once. `--search-only` stops where the
+certificate begins. `--models` puts each scenario among crates, walls and piles of boards
 (`large_worlds.py`), after the scenario's own world. Settings are such as `accept_rate=first`.
 """
 
@@ -40,7 +43,9 @@ LOOK = 0.5
 
 @dataclass(frozen=True)
 class Reduced:
-    """The state at the end, the time of all processes (CPU s) and of the clock (s), and their memory (bytes)."""
+    """The state at the end, the time of all processes (CPU s) and of the clock (s), and their
+    memory (bytes).
+    """
 
     state: RunState
     cpu: float
@@ -65,7 +70,8 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="a folder for worlds and run files")
     options = parser.parse_args()
     print(
-        "| scenario | pair | models | after the slice | left | search | all | CPU s | clock, s | memory, MB |"
+        "| scenario | pair | models | after the slice | left | search | all | CPU s | clock, s | "
+        "memory, MB |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|", flush=True)
     with tempfile.TemporaryDirectory() as temporary:
@@ -130,8 +136,10 @@ def row(scenario: Scenario, done: Reduced) -> str:
     every = sum(test.is_finished and test.implied_by is None for test in state.tests)
     certified = "certified" if state.certified else f"{state.status}, {state.reason}"
     return (
-        f"| {scenario.name} | {scenario.reduction.pair} | {len(state.elements):,} | {len(sliced(state))} "
-        f"| {len(state.environment)} {certified} | {simulated(state)} | {every} | {done.cpu:.0f} | {done.clock:.0f} "
+        f"| {scenario.name} | {scenario.reduction.pair} | {len(state.elements):,} | "
+        f"{len(sliced(state))} "
+        f"| {len(state.environment)} {certified} | {simulated(state)} | {every} | {done.cpu:.0f} "
+        f"| {done.clock:.0f} "
         f"| {done.memory / 1e6:.0f} |"
     )
 

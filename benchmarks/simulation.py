@@ -1,13 +1,15 @@
-"""How fast the robot is simulated: scenarios or a world with everything on, beside bare `AdvanceTo` on the same plant.
+"""How fast the robot is simulated: scenarios or a world with everything on, beside bare `AdvanceTo`
+on the same plant.
 
     python benchmarks/simulation.py [--seeds N] [--scenarios ditch,friction,rubble]
     python benchmarks/simulation.py --world WORLD --spawn X,Y,Z,YAW --goal X,Y [--seeds N]
 
-Each scenario runs in its whole world, and in one with every second model removed. Everything on means sensors, filter,
-controller, recording, and what the robot notices; where there is a lidar, also that and the map it makes. Bare is
-`Simulator.AdvanceTo` in the same context with the same wheel speeds at the same times, and nothing else. Loose models then never
-rest, so it is slower where there are many. Seconds are CPU seconds of one core; the first run in a world, which works out how
-loose piles settle, is left out.
+Each scenario runs in its whole world, and in one with every second model removed. Everything on
+means sensors, filter, controller, recording, and what the robot notices; where there is a lidar,
+also that and the map it makes. Bare is `Simulator.AdvanceTo` in the same context with the same
+wheel speeds at the same times, and nothing else. Loose models then never rest, so it is slower
+where there are many. Seconds are CPU seconds of one core; the first run in a world, which works out
+how loose piles settle, is left out.
 """
 
 import argparse

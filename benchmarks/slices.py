@@ -1,13 +1,15 @@
-"""Whether a run really repeats where what took no part in it is removed: simulates tests that a finished run implies.
+"""Whether a run really repeats where what took no part in it is removed: simulates tests that a
+finished run implies.
 
-    python benchmarks/slices.py [--worlds N] [--tests N] [--from NUMBER]
-    python benchmarks/slices.py ditch|friction|rubble [--seconds S] [--tests N]
-    python benchmarks/slices.py WORLD --spawn X,Y,Z,YAW --goal X,Y [--stand-in URI=SHAPE] [--inside] [--seconds S] [--tests N]
-    python benchmarks/slices.py ... --forget KIND
+    python benchmarks/slices.py [--worlds N] [--tests N] [--from NUMBER] python benchmarks/slices.py
+    ditch|friction|rubble [--seconds S] [--tests N] python benchmarks/slices.py WORLD --spawn
+    X,Y,Z,YAW --goal X,Y [--stand-in URI=SHAPE] [--inside] [--seconds S] [--tests N] python
+    benchmarks/slices.py ... --forget KIND
 
-Without a name: small random worlds (`small_worlds.py`), N of each kind. Of each world, random parts run, and then random parts of
-these that keep what took part and break no tie. Every bit must be the same. With `--forget` one kind of participant is left out on
-purpose, which the comparison must find. Prints a row for each kind of world; exits with 1 if tests differ.
+Without a name: small random worlds (`small_worlds.py`), N of each kind. Of each world, random parts
+run, and then random parts of these that keep what took part and break no tie. Every bit must be the
+same. With `--forget` one kind of participant is left out on purpose, which the comparison must
+find. Prints a row for each kind of world; exits with 1 if tests differ.
 """
 
 from __future__ import annotations
@@ -53,7 +55,9 @@ DRAWS = 10
 
 @dataclass
 class Count:
-    """Of one kind of world: how many worlds, runs, implied tests and differences, and what all that took, CPU s."""
+    """Of one kind of world: how many worlds, runs, implied tests and differences, and what all that
+    took, CPU s.
+    """
 
     worlds: int = 0
     runs: int = 0
@@ -135,7 +139,10 @@ def row(kind: str, worlds: Iterable[tuple[World, Model, Scenario]], tests: int, 
         audit(Variants(world, robot, scenario), frozenset(world.elements()), tests, first, found)
     found.seconds = time.process_time() - began
     print(
-        f"| {kind} | {found.worlds} | {found.runs} | {found.tests} | {found.differ} | {found.seconds:.0f} |",
+        (
+            f"| {kind} | {found.worlds} | {found.runs} | {found.tests} | {found.differ} | "
+            f"{found.seconds:.0f} |"
+        ),
         flush=True,
     )
     return found.differ

@@ -1,4 +1,6 @@
-"""Small flat worlds with things in the robot's way and beside it, for the audit of slices (`slices.py`)."""
+"""Small flat worlds with things in the robot's way and beside it, for the audit of slices
+(`slices.py`).
+"""
 
 from __future__ import annotations
 
@@ -109,7 +111,9 @@ def hinge(parent: str, child: str, at: tuple[float, float, float], axis: str) ->
     """`at` (m) is a place in the frame of the child."""
     place = " ".join(map(str, at))
     return (
-        f'<joint name="hinge" type="revolute"><parent>{parent}</parent><child>{child}</child><pose>{place} 0 0 0</pose>'
+        '<joint name="hinge" '
+        f'type="revolute"><parent>{parent}</parent><child>{child}</child><pose>{place} 0 0 '
+        "0</pose>"
         f"<axis><xyz>{axis}</xyz><dynamics><damping>0.5</damping></dynamics></axis></joint>"
     )
 
@@ -135,7 +139,10 @@ def model(
 ) -> str:
     """A model of one shape, static without a mass (kg)."""
     static = "" if mass else "<static>true</static>"
-    return f'<model name="{name}">{static}<pose>{x} {y} {z} 0 0 0</pose>{link("link", shape, mass)}{more}</model>'
+    return (
+        f'<model name="{name}">{static}<pose>{x} {y} {z} 0 0 '
+        f"0</pose>{link('link', shape, mass)}{more}</model>"
+    )
 
 
 KINDS: dict[str, tuple[Thing, ...]] = {

@@ -1,10 +1,11 @@
-"""Memory of an engine, a workbench and a scene over a long run: their memory after more and more tests.
+"""Memory of an engine, a workbench and a scene over a long run: their memory after more and more
+tests.
 
     python benchmarks/soak.py [--tests N]
 
-The real engine with one worker and tests that take no time, in a world of 200 models; a workbench in a terminal, and a scene, show
-its run from the start. Eight hours of `friction` with two workers are some 65,000 tests. Prints a row each time another eighth of
-the tests has ended.
+The real engine with one worker and tests that take no time, in a world of 200 models; a workbench
+in a terminal, and a scene, show its run from the start. Eight hours of `friction` with two workers
+are some 65,000 tests. Prints a row each time another eighth of the tests has ended.
 """
 
 from __future__ import annotations
@@ -27,7 +28,10 @@ from ddenv.runs.creation import create_run
 from ddenv.world.load import load_scenario
 
 # All re-runs of all candidates, so that the search does not end before its budget.
-LONG = "{baseline_runs: 4, accept_rate: first, growth: paper, skip: known, iterations: 400, budget: %d}"
+LONG = (
+    "{baseline_runs: 4, accept_rate: first, growth: paper, skip: known, iterations: 400, budget: "
+    "%d}"
+)
 STEPS = 8
 
 
@@ -60,7 +64,8 @@ def soak(run: Path, tests: int) -> None:
     engine = subprocess.Popen(words, stdout=subprocess.DEVNULL)
     viewer = Terminal([sys.executable, "-m", "ddenv", "open", str(run)], dict(os.environ))
     print(
-        "| tests | after, s | run file, MB | engine, MB | workbench, MB | scene, MB |\n|---|---|---|---|---|---|"
+        "| tests | after, s | run file, MB | engine, MB | workbench, MB | scene, MB "
+        "|\n|---|---|---|---|---|---|"
     )
     began, shown, ended, last = time.monotonic(), 0, 0, 0
     try:

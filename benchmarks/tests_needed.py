@@ -1,13 +1,17 @@
-"""How many tests each algorithm and each pair needs, compared with the bound and with picire's ddmin.
+"""How many tests each algorithm and each pair needs, compared with the bound and with picire's
+ddmin.
 
-    python benchmarks/tests_needed.py [--worlds N] [--large-worlds N] [--jobs N] [--only algorithms|pairs]
+    python benchmarks/tests_needed.py [--worlds N] [--large-worlds N] [--jobs N] [--only
+    algorithms|pairs]
 
-Random worlds without a robot: n models on 20 x 20 m; the failure needs k of them. The chance to be needed falls with the distance
-to the place of the failure, by a factor of e every 2 m. The oracle is monotone; the flaky one shows the failure in 80 % of the
-runs in which all needed models are there, and a candidate without it is run up to three times more.
+Random worlds without a robot: n models on 20 x 20 m; the failure needs k of them. The chance to be
+needed falls with the distance to the place of the failure, by a factor of e every 2 m. The oracle
+is monotone; the flaky one shows the failure in 80 % of the runs in which all needed models are
+there, and a candidate without it is run up to three times more.
 
-The bound is max(k + 1, log2 C(n, k)): the bits needed to find one of equally likely sets of k models, and the tests needed to
-leave each needed model out once. Knowing that needed models are near the failure can beat it. Needs `pip install '.[bench]'`.
+The bound is max(k + 1, log2 C(n, k)): the bits needed to find one of equally likely sets of k
+models, and the tests needed to leave each needed model out once. Knowing that needed models are
+near the failure can beat it. Needs `pip install '.[bench]'`.
 """
 
 from __future__ import annotations
@@ -101,7 +105,9 @@ def tests_of(world: World, options: dict | None, flaky: bool, seed: int) -> tupl
 def _picire(
     world: World, test: Callable[[frozenset[str]], bool], iterations: int
 ) -> tuple[int, bool]:
-    """picire asks again whether its configuration still fails before each step; what is known is not counted twice."""
+    """picire asks again whether its configuration still fails before each step; what is known is
+    not counted twice.
+    """
     import picire
 
     known: dict[frozenset[str], bool] = {frozenset(world.elements): True}
@@ -123,7 +129,9 @@ def _picire(
 
 
 def mean_of(task: tuple[tuple[int, int], dict | None, bool, int]) -> tuple[float, float]:
-    """Mean number of tests over some worlds, and in how many % exactly the needed models were left."""
+    """Mean number of tests over some worlds, and in how many % exactly the needed models were
+    left.
+    """
     size, options, flaky, worlds = task
     results = [tests_of(make_world(*size, seed), options, flaky, seed) for seed in range(worlds)]
     return float(np.mean([tests for tests, _ in results])), 100 * float(

@@ -1,11 +1,13 @@
-"""How fast the workbench answers in a real terminal (`programs.py`), on an idle machine and beside two busy processes.
+"""How fast the workbench answers in a real terminal (`programs.py`), on an idle machine and beside
+two busy processes.
 
     python benchmarks/workbench.py [--quick]
 
-The first paint is there when the screen has words, counted from before the start of the program, beside
-`python -c "import textual.app"`. Keys are pressed on runs that have ended, where nothing else writes: of the ditch, and of 10,000
-tests in a world of 5,000 models (`long_run.py`). An answer is complete when nothing more comes for 50 ms; its time ends with its
-last write. `down` in a bare Textual table is beside it. Bytes a second are those of a running reduction of the ditch.
+The first paint is there when the screen has words, counted from before the start of the program,
+beside `python -c "import textual.app"`. Keys are pressed on runs that have ended, where nothing
+else writes: of the ditch, and of 10,000 tests in a world of 5,000 models (`long_run.py`). An answer
+is complete when nothing more comes for 50 ms; its time ends with its last write. `down` in a bare
+Textual table is beside it. Bytes a second are those of a running reduction of the ditch.
 """
 
 from __future__ import annotations
@@ -135,7 +137,9 @@ def begun(terminal: Terminal) -> float:
 
 
 def first_paint(words: list[str], environment: dict[str, str], times: int) -> str:
-    """The median of some starts, each beside the bare import; one start before them compiles the program."""
+    """The median of some starts, each beside the bare import; one start before them compiles the
+    program.
+    """
     first, bare = [], []
     for number in range(times + 1):
         began = time.perf_counter()
@@ -154,7 +158,9 @@ def first_paint(words: list[str], environment: dict[str, str], times: int) -> st
 
 
 def answers(terminal: Terminal, keys: tuple[str, str], times: int) -> str:
-    """Presses a key and the one that undoes it in turn: p50 / p95 from the key to its complete answer."""
+    """Presses a key and the one that undoes it in turn: p50 / p95 from the key to its complete
+    answer.
+    """
     seconds = []
     for number in range(times):
         terminal.watch(random.uniform(0.08, 0.16))

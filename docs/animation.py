@@ -1,6 +1,8 @@
-"""Draws the README's picture: a reduction from its run file, candidate by candidate, as one animated SVG.
+"""Draws the README's picture: a reduction from its run file, candidate by candidate, as one
+animated SVG.
 
-    ddenv run friction --no-slice --output friction.ddenv && python docs/animation.py friction.ddenv docs/reduction.svg
+    ddenv run friction --no-slice --output friction.ddenv && python docs/animation.py friction.ddenv
+    docs/reduction.svg
 
 Each picture shows one candidate: the models it keeps, and the robot's path in its last test.
 """
@@ -48,7 +50,9 @@ text.similar, text.other, text.pass { stroke: none; font-weight: 600; }
 
 @dataclass(frozen=True)
 class Picture:
-    """The models that are there, those that are only left out of this test, and the test with its words."""
+    """The models that are there, those that are only left out of this test, and the test with its
+    words.
+    """
 
     there: frozenset[str]
     tried: frozenset[str]
@@ -138,17 +142,26 @@ def drawing(record: Record, shown: list[Picture], paths: list[np.ndarray]) -> st
         line = "M" + "L".join(f"{x:.0f} {y:.0f}" for x, y in points)
         x, y = points[-1]
         outcome = one.test.outcome
+        opacities = [float(place == number) for place in range(len(shown))]
         lines += [
-            f'<g opacity="0">{animated([float(place == number) for place in range(len(shown))], times)}',
-            f'<path class="path {outcome}" d="{line}"/><circle class="{outcome}" cx="{x:.0f}" cy="{y:.0f}" r="6"/>',
+            f'<g opacity="0">{animated(opacities, times)}',
+            (
+                f'<path class="path {outcome}" d="{line}"/><circle class="{outcome}" cx="{x:.0f}" '
+                f'cy="{y:.0f}" r="6"/>'
+            ),
             f'<text class="words" x="{TOP}" y="{height - 18:.0f}">{written(one.words)}</text>',
-            f'<text class="{outcome}" x="{WIDTH - TOP}" y="{height - 18:.0f}" text-anchor="end">{OUTCOMES[outcome]}</text></g>',
+            (
+                f'<text class="{outcome}" x="{WIDTH - TOP}" y="{height - 18:.0f}" '
+                f'text-anchor="end">{OUTCOMES[outcome]}</text></g>'
+            ),
         ]
     return "\n".join([*lines, "</svg>"]) + "\n"
 
 
 def animated(values: list[float], times: list[float]) -> str:
-    """An opacity that changes at `times`, s, again and again; the last one is when all of it ends."""
+    """An opacity that changes at `times`, s, again and again; the last one is when all of it
+    ends.
+    """
     changes = [
         number for number, value in enumerate(values) if not number or value != values[number - 1]
     ]

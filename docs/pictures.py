@@ -1,9 +1,10 @@
-"""Makes the 3-D pictures of what is left of the bundled scenarios, each with the robot where it failed.
+"""Makes the 3-D pictures of what is left of the bundled scenarios, each with the robot where it
+failed.
 
     python -m docs.pictures RUN...
 
-A RUN is the file of an ended run of `ditch`, `rubble` or `friction`; its picture goes to docs/NAME.png. Needs chromium and the
-extra `test`.
+A RUN is the file of an ended run of `ditch`, `rubble` or `friction`; its picture goes to
+docs/NAME.png. Needs chromium and the extra `test`.
 """
 
 from __future__ import annotations
@@ -27,14 +28,18 @@ from ddenv.scene.stage import Stage
 DOCS = Path(__file__).resolve().parent
 SIZE = (1200, 700)
 COLORS = 256
-# What the camera looks at (m), how far away it is (m), from which direction (degrees from the x axis) and how high (degrees).
+# What the camera looks at (m), how far away it is (m), from which direction (degrees from the x
+# axis) and how high (degrees).
 CAMERAS = {
     "ditch": ((0.1, 0.0, 1.9), 7.0, -58.0, 25.0),
     "rubble": ((-0.3, 0.0, 0.4), 3.9, -28.0, 14.0),
     "friction": ((2.0, -0.4, 0.2), 6.5, -60.0, 34.0),
 }
 LEGEND = ("path of this test", "ghost: the other run", "left out of this test")
-READY = "typeof play !== 'undefined' && play && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 8"
+READY = (
+    "typeof play !== 'undefined' && play && viewer.num_messages_received > 30 && "
+    "viewer.renderer.info.render.calls > 8"
+)
 # Hides Meshcat's own controls, and the entries of the legend that are not in the picture.
 TIDY = """
     run(false);

@@ -1,10 +1,12 @@
-"""Writes the results of studies into the pages: tables between marks in docs/study.md and README.md, and the first study's figures.
+"""Writes the results of studies into the pages: tables between marks in docs/study.md and
+README.md, and the first study's figures.
 
     python -m docs.study_page STUDY[,STUDY...] [AS_PRINTED]
 
-These are folders of `ddenv study`: with today's defaults, several for several scenarios; and as printed in the paper. The table of
-a folder that is not given stays as it is. A mark is <!-- NAME --> ... <!-- end -->. `headline` and `printed` have a row for each
-scenario, with the ranges of its methods.
+These are folders of `ddenv study`: with today's defaults, several for several scenarios; and as
+printed in the paper. The table of a folder that is not given stays as it is. A mark is <!-- NAME
+--> ... <!-- end -->. `headline` and `printed` have a row for each scenario, with the ranges of its
+methods.
 """
 
 from __future__ import annotations
@@ -58,7 +60,9 @@ def marked(page: str, name: str) -> str:
 
 
 def headline(nine: str) -> str:
-    """One row for each scenario of the table `nine`: how many methods are certified, and each column's range over these."""
+    """One row for each scenario of the table `nine`: how many methods are certified, and each
+    column's range over these.
+    """
     head, sides, *rows = (
         [cell.strip() for cell in line.strip("| \n").split("|")] for line in nine.splitlines()
     )
@@ -82,7 +86,9 @@ def _is_certified(cell: str) -> bool:
 
 
 def _range(column: tuple[str, ...]) -> str:
-    """Such as "40 to 78" of "45 (40 to 54)" and "64 (60 to 78)", or "95 %" where all are the same."""
+    """Such as "40 to 78" of "45 (40 to 54)" and "64 (60 to 78)", or "95 %" where all are the
+    same.
+    """
     numbers = sorted((number for cell in column for number in NUMBER.findall(cell)), key=float)
     low, high = numbers[0], numbers[-1]
     return (low if low == high else f"{low} to {high}") + (" %" if "%" in column[0] else "")

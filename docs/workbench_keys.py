@@ -12,8 +12,8 @@ from ddenv.workbench.config import Action, actions
 from ddenv.workbench.help.key_names import shown_key
 
 PAGE = Path(__file__).resolve().with_name("keys.md")
-# A table is between these: with a row for each key of the sections, or with a row for each section. Sections are the first parts of
-# the actions' names.
+# A table is between these: with a row for each key of the sections, or with a row for each section.
+# Sections are the first parts of the actions' names.
 TABLE = re.compile(r"(<!-- (keys|screens): ([\w ]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -48,7 +48,10 @@ def screens_table(sections: list[str]) -> str:
     """A row for each section with all of its keys, each line with its end."""
     found = list(actions().values())
     rows = [
-        f"| `{section}` | {' · '.join(_in_brief(action) for action in found if _section(action) == section)} |"
+        (
+            f"| `{section}` | "
+            f"{' · '.join(_in_brief(action) for action in found if _section(action) == section)} |"
+        )
         for section in sections
     ]
     return "\n".join(["| screen | keys |", "|---|---|", *rows, ""])

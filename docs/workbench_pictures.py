@@ -1,4 +1,5 @@
-"""Makes the pictures of the workbench, docs/screens/NAME.svg: a run of the ditch, guided by hand, with Drake.
+"""Makes the pictures of the workbench, docs/screens/NAME.svg: a run of the ditch, guided by hand,
+with Drake.
 
     python docs/workbench_pictures.py
 
@@ -44,7 +45,8 @@ from ddenv.world.load import SDF, find_scenario, load_scenario
 
 SCREENS = Path(__file__).resolve().parent / "screens"
 MIDDLE, SMALL, LARGE, TINY = (120, 36), (80, 24), (200, 60), (40, 10)
-# Maximum time for anything, a certificate included, s; after this much of its run the robot is worth a picture, simulated s.
+# Maximum time for anything, a certificate included, s; after this much of its run the robot is
+# worth a picture, simulated s.
 PATIENCE, UNDER_WAY = 600.0, 6.0
 HOME = Path(tempfile.gettempdir()) / "you"
 # Models that are on no machine, by place.
@@ -61,7 +63,9 @@ FLOOR = ("asphalt_near", "asphalt_far")
 
 @dataclass(frozen=True)
 class Picture:
-    """`screen` is the class of the screen; `words` are the caption, for readers who cannot see the picture."""
+    """`screen` is the class of the screen; `words` are the caption, for readers who cannot see the
+    picture.
+    """
 
     screen: str
     words: str
@@ -281,7 +285,9 @@ async def begin(pilot: Pilot[int], run: Path, engine: Popen[bytes]) -> None:
 
 
 async def from_elsewhere(pilot: Pilot[int], run: Path, engine: Popen[bytes]) -> None:
-    """The same round on other screens. All are opened first: the rounds of this run are soon over."""
+    """The same round on other screens. All are opened first: the rounds of this run are soon
+    over.
+    """
     async with AsyncExitStack() as stack:
 
         async def other(
@@ -329,7 +335,9 @@ async def take_dialogs(pilot: Pilot[int]) -> None:
 
 
 async def other_failures(pilot: Pilot[int]) -> None:
-    """A candidate that fell is not similar. Early, since later rounds of this run may meet no other failure."""
+    """A candidate that fell is not similar. Early, since later rounds of this run may meet no other
+    failure.
+    """
     while not (rows := others(state(pilot))):
         if state(pilot).certificate is not None:
             raise RuntimeError("the rounds are over, and none met another failure")
@@ -544,7 +552,9 @@ async def take(pilot: Pilot[int], name: str, *, settled_after: float = 0.6) -> N
 
 
 async def take_live(pilot: Pilot[int], name: str, guiding: Pilot[int]) -> None:
-    """A picture while a robot moves, also at its end; `guiding` lets the run go on, and accepts what waits meanwhile."""
+    """A picture while a robot moves, also at its end; `guiding` lets the run go on, and accepts
+    what waits meanwhile.
+    """
     await pause(guiding, False)
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:

@@ -53,7 +53,9 @@ def _said(words: list[str], **options) -> Said:
 
 
 def in_process(monkeypatch, capsys, *words: object) -> Said:
-    """Without a process of its own, which takes most of a second; a warning counts as a line, since it would be printed."""
+    """Without a process of its own, which takes most of a second; a warning counts as a line, since
+    it would be printed.
+    """
     monkeypatch.setattr(sys, "argv", ["ddenv", *map(str, words)])
     with warnings.catch_warnings(record=True) as shown, pytest.raises(SystemExit) as left:
         warnings.simplefilter("always")

@@ -99,7 +99,9 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(scope="session")
 def made_once(tmp_path_factory) -> Callable[[str, Callable[[Path], None]], Path]:
-    """Makes a folder's content in one of the session's processes, whichever needs it first; the others find it there."""
+    """Makes a folder's content in one of the session's processes, whichever needs it first; the
+    others find it there.
+    """
     own = tmp_path_factory.getbasetemp()
     shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
 
@@ -117,5 +119,7 @@ def made_once(tmp_path_factory) -> Callable[[str, Callable[[Path], None]], Path]
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Many tests wait for a terminal, a browser or another program: one worker more keeps all cores busy."""
+    """Many tests wait for a terminal, a browser or another program: one worker more keeps all cores
+    busy.
+    """
     return 1 + processor.usable_cores()

@@ -1,4 +1,6 @@
-"""Run files with values that mean harm: well-formed, but with numbers, names and samples that nobody would write."""
+"""Run files with values that mean harm: well-formed, but with numbers, names and samples that
+nobody would write.
+"""
 
 from __future__ import annotations
 

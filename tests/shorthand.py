@@ -1,4 +1,6 @@
-"""Events of a run in short: models by numbers in place of numbered environments, and without what follows from the state."""
+"""Events of a run in short: models by numbers in place of numbered environments, and without what
+follows from the state.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ Numbered = Callable[[Environment], int]
 
 
 def typed(state: RunState, kind: str, data: dict[str, Any]) -> list[Event]:
-    """The event in this state, and before it those that name its environments, as an engine does. Raises Invalid."""
+    """The event in this state, and before it those that name its environments, as an engine does.
+    Raises Invalid.
+    """
     numbers = {models: number for number, models in enumerate(state.environments)}
     new: list[Event] = []
 
@@ -46,7 +50,9 @@ def typed(state: RunState, kind: str, data: dict[str, Any]) -> list[Event]:
 
 
 def _full(state: RunState, kind: str, data: dict[str, Any], numbered: Numbered) -> dict[str, Any]:
-    """The data as they stand in a file: `models` of a try, and each list `environment`, by one number."""
+    """The data as they stand in a file: `models` of a try, and each list `environment`, by one
+    number.
+    """
     if kind == "trial_started" and "models" in data:
         data["environment"] = data.pop("models")
     if isinstance(data.get("environment"), list | tuple):

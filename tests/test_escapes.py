@@ -1,4 +1,6 @@
-"""No name, reason or log steers a terminal: what is printed and drawn has no control characters of theirs."""
+"""No name, reason or log steers a terminal: what is printed and drawn has no control characters of
+theirs.
+"""
 
 import io
 import json
@@ -39,7 +41,9 @@ WORLD = f'<?xml version="1.0"?><sdf version="1.9"><world name="w\x9bx">{MODELS}<
 
 @pytest.fixture
 def evil(tmp_path, home):
-    """A run whose names and reasons are all escapes, and whose engine was killed while its log was full of them."""
+    """A run whose names and reasons are all escapes, and whose engine was killed while its log was
+    full of them.
+    """
     run = fake_moments.mid_round(fake_run.FakeRun(tmp_path / "a.ddenv"))
     run.close()
     with sqlite3.connect(run.path) as database:

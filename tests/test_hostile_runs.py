@@ -1,4 +1,6 @@
-"""Whatever values a stored run has, it opens in every viewer, or says in a line that it is damaged."""
+"""Whatever values a stored run has, it opens in every viewer, or says in a line that it is
+damaged.
+"""
 
 import json
 import os

@@ -131,7 +131,9 @@ ddenv = some_robotics_lab:one_by_one
 
 @pytest.fixture
 def plugin(tmp_path):
-    """Another package with schemas of its own, as pip would have put it there; runs code beside it."""
+    """Another package with schemas of its own, as pip would have put it there; runs code beside
+    it.
+    """
     (tmp_path / "some_robotics_lab.py").write_text(PLUGIN)
     lab = tmp_path / "large_lab"
     (lab / "orders").mkdir(parents=True)
@@ -152,15 +154,23 @@ def test_another_packages_schema_is_listed_explained_and_used(plugin):
     done = plugin(
         "import ddenv; from ddenv import schemas\n"
         "print('some_robotics_lab' in sys.modules, 'timeseg/by-name' in schemas.pairs())\n"
-        "print(schemas.explanation('prioritization', 'by-name'), 'some_robotics_lab' in sys.modules)\n"
-        "facts = dict(positions={n: (i, 0, 0) for i, n in enumerate('abcdef')}, failure_pose=(0, 0, 0))\n"
-        "print(ddenv.reduce('abcdef', lambda kept: kept >= {'c'}, prioritization='by-name', **facts).kept)\n"
-        "print(ddenv.reduce('abcdef', lambda kept: kept >= {'c'}, algorithm='one-by-one', iterations=0, **facts).tests)\n"
+        "print(schemas.explanation('prioritization', 'by-name'), 'some_robotics_lab' in "
+        "sys.modules)\n"
+        "facts = dict(positions={n: (i, 0, 0) for i, n in enumerate('abcdef')}, failure_pose=(0, "
+        "0, 0))\n"
+        "print(ddenv.reduce('abcdef', lambda kept: kept >= {'c'}, prioritization='by-name', "
+        "**facts).kept)\n"
+        "print(ddenv.reduce('abcdef', lambda kept: kept >= {'c'}, algorithm='one-by-one', "
+        "iterations=0, **facts).tests)\n"
     )
     assert done.stderr == ""
     assert done.stdout.splitlines() == [
         "False True",
-        "Partitions are tried by the last letter of their first model's name. It only shows how it is done. False",
+        (
+            "Partitions are tried by the last letter of their first model's name. It only shows "
+            "how "
+            "it is done. False"
+        ),
         "('c',)",
         # All at first, the five that go, c in vain, and c again when it is alone.
         "8",
@@ -170,7 +180,8 @@ def test_another_packages_schema_is_listed_explained_and_used(plugin):
 def test_explaining_imports_no_package_and_tells_nothing_else(plugin):
     done = plugin(
         "from ddenv import schemas\n"
-        "print([schemas.explanation('prioritization', name) for name in ('deep', 'rude', 'inside')])\n"
+        "print([schemas.explanation('prioritization', name) for name in ('deep', 'rude', "
+        "'inside')])\n"
         "print('a/b' in schemas.names('prioritization'))"
     )
     assert (done.stdout.splitlines(), done.stderr) == (["['As they come.', '', '']", "False"], "")
@@ -195,10 +206,12 @@ BREAK_THEIR_WORD = {
 def test_a_schema_that_breaks_its_word_is_told_in_one_line(plugin):
     done = plugin(
         "import ddenv\n"
-        "facts = dict(positions={n: (i, 0, 0) for i, n in enumerate('abcdef')}, failure_pose=(0, 0, 0))\n"
+        "facts = dict(positions={n: (i, 0, 0) for i, n in enumerate('abcdef')}, failure_pose=(0, "
+        "0, 0))\n"
         f"for split, order in map(lambda pair: pair.split('/'), {list(BREAK_THEIR_WORD)}):\n"
         "    try:\n"
-        "        ddenv.reduce('abcdef', lambda kept: kept >= {'c'}, partitioning=split, prioritization=order, **facts)\n"
+        "        ddenv.reduce('abcdef', lambda kept: kept >= {'c'}, partitioning=split, "
+        "prioritization=order, **facts)\n"
         "    except ddenv.UserError as error:\n"
         "        print('told:', error)\n"
     )
@@ -233,7 +246,8 @@ def test_a_broken_package_is_told_in_one_line(plugin):
 def test_ours_come_first_and_cannot_be_replaced_by_name(plugin):
     done = plugin(
         "from ddenv import schemas\n"
-        "print(schemas.names('prioritization')[0], schemas.pairs()[0], schemas.load('algorithm', 'ddenv').__module__)"
+        "print(schemas.names('prioritization')[0], schemas.pairs()[0], schemas.load('algorithm', "
+        "'ddenv').__module__)"
     )
     assert done.stdout.split() == [
         "failure-proximal",

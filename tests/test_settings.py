@@ -71,7 +71,8 @@ def test_a_scenario_takes_what_is_in_its_range(one):
         + [*one.choices, "of nobody", None, -1, True, False]
     )
     for value in values:
-        # Any word can be the name of another package's schema; pydantic makes a number of a truth value.
+        # Any word can be the name of another package's schema; pydantic makes a number of a truth
+        # value.
         if (one.shown == "method" and isinstance(value, str)) or (
             isinstance(value, bool) and one.kind is not bool
         ):

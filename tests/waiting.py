@@ -8,7 +8,8 @@ import time
 from collections.abc import Callable
 from inspect import isawaitable
 
-# Only what hangs takes so long (s): a slow machine is no bug. One that does other work at the same time needs more.
+# Only what hangs takes so long (s): a slow machine is no bug. One that does other work at the same
+# time needs more.
 PATIENCE = float(os.environ.get("DDENV_PATIENCE", "300"))
 # Between two looks (s).
 PERIOD = 0.02

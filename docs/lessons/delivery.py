@@ -1,8 +1,8 @@
 """The robot of the first lesson: it follows a rule that anybody can follow on the map.
 
-It drives to where the road forks. If the sign stands there it takes the left lane, otherwise the right one. It gets stuck where
-its lane is closed. The wide crate closes the left lane; right behind it, so do the barrel and the cone, side by side. The pallet
-closes the right one.
+It drives to where the road forks. If the sign stands there it takes the left lane, otherwise the
+right one. It gets stuck where its lane is closed. The wide crate closes the left lane; right behind
+it, so do the barrel and the cone, side by side. The pallet closes the right one.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ CRATE_STOP, PAIR_STOP, PALLET_STOP = 0.15, 0.55, 0.9
 
 
 def way(models: Iterable[str], seed: int = 0) -> tuple[list[tuple[float, float]], bool]:
-    """The corners of the robot's path among these models, m, and whether it reaches the goal; the same for every `seed`."""
+    """The corners of the robot's path among these models, m, and whether it reaches the goal; the
+    same for every `seed`.
+    """
     there = frozenset(models)
     left = "sign" in there
     y = LANE if left else -LANE
@@ -31,6 +33,8 @@ def way(models: Iterable[str], seed: int = 0) -> tuple[list[tuple[float, float]]
 
 
 def outcome(models: Iterable[str]) -> str:
-    """How a test with these models ends: "similar" (stuck in the left lane), "other" (in the right one) or "pass"."""
+    """How a test with these models ends: "similar" (stuck in the left lane), "other" (in the right
+    one) or "pass".
+    """
     corners, reached = way(models)
     return "pass" if reached else "similar" if corners[-1][1] > 0 else "other"

@@ -19,7 +19,9 @@ SPEED = 0.5  # m/s
 def places(
     corners: list[tuple[float, float]], step: float, waits: float
 ) -> Iterator[tuple[float, float, float]]:
-    """Time (s), x and y (m) along the corners of a path, every `step` s; at its end the robot stands until the time `waits`."""
+    """Time (s), x and y (m) along the corners of a path, every `step` s; at its end the robot
+    stands until the time `waits`.
+    """
     time = 0.0
     for (x, y), (to_x, to_y) in pairwise(corners):
         count = max(1, round(((to_x - x) ** 2 + (to_y - y) ** 2) ** 0.5 / (SPEED * step)))

@@ -1,7 +1,8 @@
 """The robot of the lessons on flaky failures and on certificates: luck is part of its rule.
 
-It drives along a quay, straight on. Now and then it comes off its line by itself; oil and ramp make that much likelier. Off its
-line it gets stuck at the gate; without the gate it gets stuck at the crate behind it; without both it arrives all the same.
+It drives along a quay, straight on. Now and then it comes off its line by itself; oil and ramp make
+that much likelier. Off its line it gets stuck at the gate; without the gate it gets stuck at the
+crate behind it; without both it arrives all the same.
 """
 
 from __future__ import annotations

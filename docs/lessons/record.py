@@ -35,9 +35,11 @@ LESSONS = HERE.parents[1] / "src/ddenv/learn/lessons"
 
 @dataclass(frozen=True)
 class Recorded:
-    """A run in a toy `world` or a bundled scenario. `reduction` has settings over those of the toy's scenario.
+    """A run in a toy `world` or a bundled scenario. `reduction` has settings over those of the
+    toy's scenario.
 
-    `shown`: a lesson shows it on the map; of the others only figures are shown. With a `certify_rate` its last certificate goes on.
+    `shown`: a lesson shows it on the map; of the others only figures are shown. With a
+    `certify_rate` its last certificate goes on.
     """
 
     world: str
@@ -123,7 +125,9 @@ def record(name: str) -> None:
 
 
 def written(toy: Toy, folder: Path, reduction: Mapping[str, Any]) -> Path:
-    """Writes a toy world, its robot, its simulator and its scenario with these settings; returns the scenario's file."""
+    """Writes a toy world, its robot, its simulator and its scenario with these settings; returns
+    the scenario's file.
+    """
     for file in ("robot.sdf", SIMULATOR, f"{toy.rule}.py"):
         shutil.copy(HERE / file, folder / file)
     (folder / SIMULATOR).chmod(0o755)
@@ -141,11 +145,15 @@ def world_of(toy: Toy) -> str:
     for box in (*toy.walls, *toy.models):
         boxes.setdefault(box[0], []).append(box)
     models = "\n".join(
-        f'<model name="{name}"><static>true</static><link name="link">{"".join(map(_collision, range(9), each))}</link></model>'
+        (
+            f'<model name="{name}"><static>true</static><link '
+            f'name="link">{"".join(map(_collision, range(9), each))}</link></model>'
+        )
         for name, each in boxes.items()
     )
     ground = (
-        '<model name="ground_plane"><static>true</static><link name="link"><collision name="plane"><geometry><plane>'
+        '<model name="ground_plane"><static>true</static><link name="link"><collision '
+        'name="plane"><geometry><plane>'
         "<normal>0 0 1</normal></plane></geometry></collision></link></model>"
     )
     return f'<sdf version="1.9"><world name="toy">\n{ground}\n{models}\n</world></sdf>\n'
@@ -210,7 +218,8 @@ def told(run: str) -> set[int]:
 def slim(run: Path, shown: bool, told: set[int]) -> None:
     """Removes the trajectories that no map shows; of a run that is not `shown` all of them.
 
-    Those of `told` tests stay, with the other tests of the same candidates: their verdicts are told, too.
+    Those of `told` tests stay, with the other tests of the same candidates: their verdicts are
+    told, too.
     """
     with RunFile(run) as file:
         state = fold(file.events())
@@ -229,7 +238,8 @@ def slim(run: Path, shown: bool, told: set[int]) -> None:
     tests = ",".join(map(str, sorted(kept))) if shown else ""
     database.execute(f"DELETE FROM motion WHERE model != '' OR test NOT IN ({tests})")
     database.commit()
-    # Within a transaction this would change nothing, and readers would write files beside the lesson.
+    # Within a transaction this would change nothing, and readers would write files beside the
+    # lesson.
     database.execute("PRAGMA journal_mode = DELETE")
     database.execute("VACUUM")
     database.close()

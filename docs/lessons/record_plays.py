@@ -1,4 +1,5 @@
-"""Records what algorithms do in a lesson's world, so that lessons show it without the algorithms themselves.
+"""Records what algorithms do in a lesson's world, so that lessons show it without the algorithms
+themselves.
 
 python -m docs.lessons.record_plays FILE.yaml   adds it to the oracle of the lesson
 """
@@ -30,7 +31,8 @@ from ddenv.world.extent import center
 
 
 def record_plays(file: Path) -> tuple[Path, tuple[str, ...]]:
-    """Writes into the oracle of a lesson what the algorithms did that it compares; returns its path and their names.
+    """Writes into the oracle of a lesson what the algorithms did that it compares; returns its path
+    and their names.
 
     All algorithms, if students search on their own. Raises UserError.
     """
@@ -59,7 +61,9 @@ def _places(run: Path) -> Callable[[str], int]:
 
 
 def _evidence(lesson: Lesson) -> dict[str, Any]:
-    """What the schemas look at, from the lesson's run: the oracle knows no trajectories, so that of f has to do."""
+    """What the schemas look at, from the lesson's run: the oracle knows no trajectories, so that of
+    f has to do.
+    """
     with RunFile(lesson.run) as content:
         _, world, _ = read_parts(content)
         state = fold(content.events())

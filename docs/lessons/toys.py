@@ -12,7 +12,9 @@ Box = tuple[str, float, float, float, float]
 
 @dataclass(frozen=True)
 class Toy:
-    """A world of boxes in which a robot drives by a `rule`, a file beside this one. `walls` always stay."""
+    """A world of boxes in which a robot drives by a `rule`, a file beside this one. `walls` always
+    stay.
+    """
 
     rule: str
     walls: tuple[Box, ...]
@@ -100,7 +102,8 @@ YARD = Toy(
     ),
 )
 _SIGN = tuple(box for box in YARD.models if box[0] == "sign")
-# The same yard, with a sign that always stays: all that f needs then is near to where the robot gets stuck.
+# The same yard, with a sign that always stays: all that f needs then is near to where the robot
+# gets stuck.
 NAILED = replace(
     YARD, walls=(*YARD.walls, *_SIGN), models=tuple(box for box in YARD.models if box not in _SIGN)
 )

@@ -1,8 +1,10 @@
-"""Writes ditch.sdf: two asphalt platforms with a gap between them, forty tiles of rough terrain and a cinder block.
+"""Writes ditch.sdf: two asphalt platforms with a gap between them, forty tiles of rough terrain and
+a cinder block.
 
     python sdf/worlds/make_ditch.py
 
-The gap lies across the y axis at x = 0, across the path of a robot that comes along the x axis: a little too wide for its wheels.
+The gap lies across the y axis at x = 0, across the path of a robot that comes along the x axis: a
+little too wide for its wheels.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ SETBACK = 0.1  # m between the edge tile and the gap
 MU = 1.2  # rubber on dry asphalt and wood
 SOIL = "0.45 0.47 0.42 1"
 
-# Places of tiles on one side: distance from the gap's edge to the tile's centre, offset to the left, heading in degrees.
+# Places of tiles on one side: distance from the gap's edge to the tile's centre, offset to the
+# left, heading in degrees.
 NEAR = [
     (1.75, 0.15, 90), (2.75, -0.2, 80), (7.55, 0.1, 90),
     (0.5, 2.4, 90), (0.55, 3.77, 84), (0.5, -2.4, 92), (0.6, -3.8, 90),
@@ -47,7 +50,9 @@ FAR = [
 
 
 def tile(rng: random.Random) -> str:
-    """A plate with rows of blocks; neighbours in a row differ in height. Its frame lies on its underside."""
+    """A plate with rows of blocks; neighbours in a row differ in height. Its frame lies on its
+    underside.
+    """
     boxes = pieces.box("plate", (0, 0, PLATE / 2), (*TILE, PLATE), MU, pieces.PLYWOOD)
     for row in range(ROWS):
         shift = rng.randrange(len(BLOCK_HEIGHTS))

@@ -1,9 +1,10 @@
-"""Writes friction.sdf: construction barrels on a sloping road, with patches of slippery and of rough ground.
+"""Writes friction.sdf: construction barrels on a sloping road, with patches of slippery and of
+rough ground.
 
     python sdf/worlds/make_friction.py
 
-The road leads along the x axis and falls to the right. Red patches have a thousand times the friction of green ones; the asphalt,
-which is the ground, lies in between.
+The road leads along the x axis and falls to the right. Red patches have a thousand times the
+friction of green ones; the asphalt, which is the ground, lies in between.
 """
 
 from __future__ import annotations

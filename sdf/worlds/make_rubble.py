@@ -1,8 +1,10 @@
-"""Writes rubble.sdf: a pile of loose 2x4 boards with a narrow path through it, and two cinder blocks hidden in the path.
+"""Writes rubble.sdf: a pile of loose 2x4 boards with a narrow path through it, and two cinder
+blocks hidden in the path.
 
     python sdf/worlds/make_rubble.py
 
-The path leads along the x axis between two cribs of boards. Each block carries the ends of two boards: they make a ramp.
+The path leads along the x axis between two cribs of boards. Each block carries the ends of two
+boards: they make a ramp.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""SDF text for models made of boxes and cylinders, of which the `make_*.py` scripts build their worlds."""
+"""SDF text for models made of boxes and cylinders, of which the `make_*.py` scripts build their
+worlds.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ def material(color: str) -> str:
 
 
 def part(name: str, position: Sequence[float], geometry: str, mu: float, color: str) -> str:
-    """A collision and a visual of the same shape. SDF wants different names for all parts of a link."""
+    """A collision and a visual of the same shape. SDF wants different names for all parts of a
+    link.
+    """
     return collision(name, position, geometry, mu) + visual(
         f"{name}_visual", position, geometry, color
     )
@@ -87,12 +91,17 @@ def ground(color: str, mu: float | None = None, pose: Sequence[float] = ()) -> s
     plane = "<geometry><plane><normal>0 0 1</normal><size>60 60</size></plane></geometry>"
     return (
         '    <model name="ground_plane">\n      <static>true</static>\n'
-        f'{place}      <link name="link">\n        <collision name="ground">{plane}{surface}</collision>\n'
-        f'        <visual name="ground_visual">\n          {plane}\n          {material(color)}\n        </visual>\n'
+        f'{place}      <link name="link">\n        <collision '
+        f'name="ground">{plane}{surface}</collision>\n'
+        f'        <visual name="ground_visual">\n          {plane}\n          '
+        f"{material(color)}\n        </visual>\n"
         "      </link>\n    </model>\n"
     )
 
 
 def world(name: str, models: Iterable[str]) -> str:
-    head = f'<?xml version="1.0"?>\n<sdf version="1.9">\n  <world name="{name}">\n    <gravity>0 0 -9.81</gravity>\n'
+    head = (
+        f'<?xml version="1.0"?>\n<sdf version="1.9">\n  <world name="{name}">\n    <gravity>0 0 '
+        "-9.81</gravity>\n"
+    )
     return f"{head}{_SUN}{''.join(models)}  </world>\n</sdf>\n"

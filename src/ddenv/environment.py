@@ -1,6 +1,7 @@
 """An environment: a set of models, each of them a number, as the bits of one integer.
 
-Model number i is the i-th of the run's elements. Sets of names would take a thousand times as long in a world of 5,000 models.
+Model number i is the i-th of the run's elements. Sets of names would take a thousand times as long
+in a world of 5,000 models.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ Numbers = tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """A set of models with the operators of `frozenset`; it iterates over their numbers in rising order."""
+    """A set of models with the operators of `frozenset`; it iterates over their numbers in rising
+    order.
+    """
 
     bits: int = 0
 

@@ -1,7 +1,9 @@
-"""Partitionings, prioritizations and algorithms by name: where each is implemented, and its explanation.
+"""Partitionings, prioritizations and algorithms by name: where each is implemented, and its
+explanation.
 
-Listing and explaining them imports nothing, so views can show all of them without scikit-learn. Other packages add their own
-through entry points in the groups `ddenv.partitionings`, `ddenv.prioritizations` and `ddenv.algorithms`.
+Listing and explaining them imports nothing, so views can show all of them without scikit-learn.
+Other packages add their own through entry points in the groups `ddenv.partitionings`,
+`ddenv.prioritizations` and `ddenv.algorithms`.
 """
 
 from __future__ import annotations
@@ -92,7 +94,9 @@ def check(kind: Kind, name: str) -> None:
 
 
 def load(kind: Kind, name: str) -> Callable[..., Any]:
-    """The function itself. Raises UserError for an unknown name, and if another package's function cannot be loaded."""
+    """The function itself. Raises UserError for an unknown name, and if another package's function
+    cannot be loaded.
+    """
     check(kind, name)
     entry = _known(kind)[name]
     try:
@@ -125,7 +129,9 @@ def explanation(kind: Kind, name: str) -> str:
 
 
 def _source(module: str) -> Path:
-    """The file of a module, found without importing the packages around it, as Python would. Raises ImportError."""
+    """The file of a module, found without importing the packages around it, as Python would. Raises
+    ImportError.
+    """
     top, *inside = module.split(".")
     spec = importlib.util.find_spec(top)
     for name in inside:

@@ -1,7 +1,9 @@
-"""Each setting of a run, once: type, default, unit, range, meaning, where it shows, and whether it may change during a run.
+"""Each setting of a run, once: type, default, unit, range, meaning, where it shows, and whether it
+may change during a run.
 
-The scenario's sections, the setup form, the command line and its help, the tables in the docs, and the report come from here. A
-new setting is one line in a class below. Nothing heavy is imported: the command line needs this file at once.
+The scenario's sections, the setup form, the command line and its help, the tables in the docs, and
+the report come from here. A new setting is one line in a class below. Nothing heavy is imported:
+the command line needs this file at once.
 """
 
 from __future__ import annotations
@@ -14,7 +16,8 @@ from ddenv.text import Data, plain
 
 Value = int | float | str | bool | None
 
-# Models and robots are at most this far from the origin, m, and a heading makes at most so many radians.
+# Models and robots are at most this far from the origin, m, and a heading makes at most so many
+# radians.
 FARTHEST = 1e6
 TURNS = 1e3
 
@@ -25,8 +28,9 @@ IGNORABLE: tuple[str, ...] = get_args(Ignorable)
 MeshReading = Literal["pieces", "hull"]
 MESH_READINGS: tuple[str, ...] = get_args(MeshReading)
 
-# Where a setting shows. "method" is chosen by schemas, "basic" and "more" are fields of the setup form, and all three are options
-# of the command line, as "option" is. "scenario" is in scenario files (and in `ddenv.reduce`) alone.
+# Where a setting shows. "method" is chosen by schemas, "basic" and "more" are fields of the setup
+# form, and all three are options of the command line, as "option" is. "scenario" is in scenario
+# files (and in `ddenv.reduce`) alone.
 Shown = Literal["method", "basic", "more", "option", "scenario"]
 
 
@@ -34,10 +38,11 @@ Shown = Literal["method", "basic", "more", "option", "scenario"]
 class Setting:
     """A setting and all that is known about it.
 
-    `meaning` is a short phrase without a full stop; `more` has further sentences, shown if they fit. `cost` is a sentence on
-    the cost. A value is at least `least`, greater than `above`, at most `most`. `none` is the word for no value, if that is
-    allowed. `printed` is the paper's value. `used_by` are the algorithms or partitionings that use it, if not all do. `stored`
-    is False for a setting that only sets others. The last four come from the declaration.
+    `meaning` is a short phrase without a full stop; `more` has further sentences, shown if they
+    fit. `cost` is a sentence on the cost. A value is at least `least`, greater than `above`, at
+    most `most`. `none` is the word for no value, if that is allowed. `printed` is the paper's
+    value. `used_by` are the algorithms or partitionings that use it, if not all do. `stored` is
+    False for a setting that only sets others. The last four come from the declaration.
     """
 
     default: Value
@@ -140,7 +145,10 @@ class Reduction:
 
     pair: str = setting(
         "model2model/avg-trajectory-proximal",
-        "how the environment is split and in which order its parts are tried: partitioning/prioritization",
+        (
+            "how the environment is split and in which order its parts are tried: "
+            "partitioning/prioritization"
+        ),
         shown="method",
         may_change=True,
         more="'ddenv schemas' explains each.",
@@ -182,7 +190,10 @@ class Reduction:
     seeds: Literal["hashed", "consecutive"] = setting(
         "hashed",
         "the seed of run i: a hash of the seed and i (hashed), or seed + i (consecutive)",
-        more="Consecutive is for simulators that use the seed as an index; poor generators draw similar numbers from them.",
+        more=(
+            "Consecutive is for simulators that use the seed as an index; poor generators draw "
+            "similar numbers from them."
+        ),
     )
     baseline_runs: int = setting(
         10, "runs of the whole world before the first round", least=1, most=1000, shown="more"
@@ -207,22 +218,32 @@ class Reduction:
     )
     accept_rate: Literal["first", "kept", "exact"] = setting(
         "kept",
-        "when a candidate is accepted: at its first run with f (first), at a run with f if all its runs fit the rate of f (kept), "
+        "when a candidate is accepted: at its first run with f (first), at a run with f if all "
+        "its runs fit the rate of f (kept), "
         "or if a failing run of the baseline, replayed with its seed, still shows f (exact)",
         printed="first",
         shown="more",
         may_change=True,
-        more="The paper's rule is first. With first and exact, what is left may fail far more rarely than the whole world.",
+        more=(
+            "The paper's rule is first. With first and exact, what is left may fail far more "
+            "rarely than the whole world."
+        ),
         cost="Where f is rare, kept takes thousands of tests and exact about a hundred.",
     )
     exact_seeds: int = setting(
         4,
-        "how many failing runs of the baseline 'accept_rate: exact' replays; a candidate is accepted if one of them shows f",
+        (
+            "how many failing runs of the baseline 'accept_rate: exact' replays; a candidate is "
+            "accepted if one of them shows f"
+        ),
         least=1,
         most=1000,
         shown="option",
         may_change=True,
-        cost="With more, fewer candidates are lost by chance, but each candidate without f takes more tests.",
+        cost=(
+            "With more, fewer candidates are lost by chance, but each candidate without f takes "
+            "more tests."
+        ),
     )
     keep_rate: float = setting(
         0.8,
@@ -238,7 +259,10 @@ class Reduction:
         above=0,
         most=0.95,
         shown="more",
-        more="Fresh runs are made until they show that what is left keeps this share; 'ddenv certify' can raise it.",
+        more=(
+            "Fresh runs are made until they show that what is left keeps this share; 'ddenv "
+            "certify' can raise it."
+        ),
         cost="0.8 takes about twice as many fresh runs.",
     )
     keep_supports: bool = setting(
@@ -249,21 +273,31 @@ class Reduction:
     )
     early_stop: bool = setting(
         True,
-        "end a test once its controller has stopped and it rests well inside or outside epsilon; certificate runs never end early",
+        (
+            "end a test once its controller has stopped and it rests well inside or outside "
+            "epsilon; "
+            "certificate runs never end early"
+        ),
         printed=False,
         shown="option",
         cost="On saves the rest of each test in which the controller has stopped.",
     )
     slice: bool = setting(
         True,
-        "remove without testing what cannot have affected a run, and skip tests whose result follows from another one",
+        (
+            "remove without testing what cannot have affected a run, and skip tests whose result "
+            "follows from another one"
+        ),
         printed=False,
         shown="option",
         cost="On saves most tests; off simulates all of them.",
     )
     audit: int = setting(
         20,
-        "one in this many tests whose result follows from another one is simulated anyway and compared bit for bit",
+        (
+            "one in this many tests whose result follows from another one is simulated anyway and "
+            "compared bit for bit"
+        ),
         least=1,
         most=1_000_000,
         shown="option",
@@ -273,7 +307,10 @@ class Reduction:
         "here",
         "where the tests run: here, or on the workers of a Dask cluster",
         shown="more",
-        more="tcp://HOST:PORT or tls://HOST:PORT of a scheduler, the path of its file, or ssh:HOST1,HOST2 to start one.",
+        more=(
+            "tcp://HOST:PORT or tls://HOST:PORT of a scheduler, the path of its file, or "
+            "ssh:HOST1,HOST2 to start one."
+        ),
         cost="Costs no tests: the results are the same as on this machine.",
     )
     growth: Literal["paper", "steady"] = setting(
@@ -284,7 +321,11 @@ class Reduction:
     )
     skip: Literal["known", "implied"] = setting(
         "implied",
-        "which candidates are skipped: sets judged before (known), or also sets without a group that was needed before (implied)",
+        (
+            "which candidates are skipped: sets judged before (known), or also sets without a "
+            "group "
+            "that was needed before (implied)"
+        ),
         printed="known",
         used_by=("ddenv",),
     )
@@ -296,7 +337,11 @@ class Reduction:
     )
     complement_order: Literal["paper", "far-first"] = setting(
         "paper",
-        "each complement after its part (paper), or first those without the models farthest away (far-first)",
+        (
+            "each complement after its part (paper), or first those without the models farthest "
+            "away "
+            "(far-first)"
+        ),
         printed="paper",
         used_by=("ddenv",),
     )
@@ -317,7 +362,9 @@ class Reduction:
 
 
 class Failure:
-    """What counts as the same failure: still short of the goal at `timeout`, within `epsilon` of where f ended."""
+    """What counts as the same failure: still short of the goal at `timeout`, within `epsilon` of
+    where f ended.
+    """
 
     timeout: float = setting(
         45.0, "simulated time the robot has", unit="s", least=0.01, most=100_000, shown="basic"
@@ -334,15 +381,19 @@ class Failure:
     )
     similarity: Literal["end-pose", "trajectory"] = setting(
         "end-pose",
-        "what similar failures share: where they end (end-pose), or also how they got there (trajectory)",
+        (
+            "what similar failures share: where they end (end-pose), or also how they got there "
+            "(trajectory)"
+        ),
         shown="more",
         cost="Costs no tests by itself; trajectory is stricter, so less may be removed.",
     )
 
 
 class Simulation:
-    """How Drake simulates. `wall_timeout` bounds one test in real time; None for a limit that follows the speed. `memory_limit`
-    bounds the memory of one worker; None for its share of what the machine allows.
+    """How Drake simulates. `wall_timeout` bounds one test in real time; None for a limit that
+    follows the speed. `memory_limit` bounds the memory of one worker; None for its share of what
+    the machine allows.
     """
 
     time_step: float = setting(
@@ -353,7 +404,11 @@ class Simulation:
     )
     wall_timeout: float | None = setting(
         None,
-        "maximum real time of one test without its preparation; by default 1800 in the baseline, then set by its speed",
+        (
+            "maximum real time of one test without its preparation; by default 1800 in the "
+            "baseline, "
+            "then set by its speed"
+        ),
         unit="s",
         least=0.01,
         most=1_000_000,
@@ -361,7 +416,10 @@ class Simulation:
     )
     memory_limit: float | None = setting(
         None,
-        "maximum memory of one worker; by default its share of 90 % of the memory that the machine or container allows",
+        (
+            "maximum memory of one worker; by default its share of 90 % of the memory that the "
+            "machine or container allows"
+        ),
         unit="GB",
         least=0.01,
         most=1_000_000,
@@ -411,7 +469,9 @@ def is_printed(reduction: Mapping[str, Any]) -> bool:
 
 
 def read(scenario: Mapping[str, Any], one: Setting) -> Value:
-    """The value of a setting in a scenario as plain data; its default where it is missing or damaged."""
+    """The value of a setting in a scenario as plain data; its default where it is missing or
+    damaged.
+    """
     section = scenario.get(one.section)
     if not isinstance(section, Mapping):
         return one.default

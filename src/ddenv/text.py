@@ -1,4 +1,6 @@
-"""Text for people: numbers as they are worded, what is safe to print, how wide it is, and as much of it as fits."""
+"""Text for people: numbers as they are worded, what is safe to print, how wide it is, and as much
+of it as fits.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ def printable(text: str) -> str:
 
 
 def plain(text: object) -> str:
-    """`text` on one line without control characters: names come from files, and must not control the terminal."""
+    """`text` on one line without control characters: names come from files, and must not control
+    the terminal.
+    """
     return printable(" ".join(str(text).split()))
 
 
@@ -42,8 +46,8 @@ def _width(char: str) -> int:
 
 
 def shortened(name: str, columns: int, head: int | None = None) -> str:
-    """`name` without control characters, cut to `columns`. `head` of them come before the ellipsis; by default about half, since
-    names of copies differ at their ends.
+    """`name` without control characters, cut to `columns`. `head` of them come before the ellipsis;
+    by default about half, since names of copies differ at their ends.
     """
     name = printable(name)
     if width(name) <= columns:
@@ -60,7 +64,9 @@ def shortened(name: str, columns: int, head: int | None = None) -> str:
 
 @lru_cache(maxsize=64)
 def told_apart(names: tuple[str, ...], columns: int) -> dict[str, str]:
-    """Each name as it is shortened to `columns`, with the ellipsis nearest to the middle where no two look the same."""
+    """Each name as it is shortened to `columns`, with the ellipsis nearest to the middle where no
+    two look the same.
+    """
     for head in (None, *sorted(range(columns), key=lambda place: abs(place - columns // 2))):
         texts = {name: shortened(name, columns, head) for name in names}
         if len(set(texts.values())) == len(texts):
@@ -110,7 +116,9 @@ def duration(seconds: float) -> str:
 
 
 def rounded(number: float) -> int:
-    """An estimate as it is said: no more exact than to a tenth, and only up to 10 to a single one; 1 at least."""
+    """An estimate as it is said: no more exact than to a tenth, and only up to 10 to a single one;
+    1 at least.
+    """
     if not 10 <= number < math.inf:
         return max(1, round(number)) if math.isfinite(number) else 1
     digits: int = 10 ** math.floor(math.log10(number))

@@ -34,13 +34,13 @@ def test_a_result_is_told_with_its_runs_and_what_they_mean(run):
     assert found["certificate"]["whole_world"]["outcomes"] == {"similar": 22, "pass": 1}
     assert "minimal environment: 2 of 11 models" in lines
     assert (
-        "what is left: f in 23 of 23 fresh runs (80 % to 100 %): keeps at least 81 % of the whole world's rate"
-        in lines
-    )
+        "what is left: f in 23 of 23 fresh runs (80 % to 100 %): keeps at least 81 % of the "
+        "whole world's rate"
+    ) in lines
     assert (
-        "without crate_01: f in 1 of 12 fresh runs (<1 % to 48 %): needed: without it f shows at most 62 % as often"
-        in lines
-    )
+        "without crate_01: f in 1 of 12 fresh runs (<1 % to 48 %): needed: without it f shows at "
+        "most 62 % as often"
+    ) in lines
 
 
 def test_a_result_with_a_certificate_says_what_can_be_done_with_it(run, home):

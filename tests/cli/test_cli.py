@@ -135,7 +135,8 @@ def test_the_streams_of_runs_are_those_of_their_trajectories(reduced, tmp_path):
 
 @pytest.mark.programs
 def test_with_early_stop_a_robot_that_still_pushes_is_watched_to_the_end(home, reduced):
-    # It stands at the wall for longer than any patience, but its controller never stops: noise might set it free.
+    # It stands at the wall for longer than any patience, but its controller never stops: noise
+    # might set it free.
     done = ddenv("run", WALL, "--json", "--jobs", 2, "--timeout", 14, "--early-stop", "--no-slice")
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
@@ -217,7 +218,10 @@ MISTAKES = {
     ),
     "algorithm": (
         ["run", WALL, "--algorithm", "ddmn"],
-        f"ddenv: --algorithm: 'ddmn' is not allowed (did you mean ddmin?); use one of {', '.join(names('algorithm'))}",
+        (
+            "ddenv: --algorithm: 'ddmn' is not allowed (did you mean ddmin?); use one of "
+            f"{', '.join(names('algorithm'))}"
+        ),
     ),
     "epsilon": (["run", WALL, "--epsilon", "0"], "--epsilon: expected 0.001 to 1000, found 0"),
     "iterations": (

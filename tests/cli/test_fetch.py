@@ -1,4 +1,6 @@
-"""`--fetch`: models of a world come from Fuel into its cache. A server on the loopback stands for Fuel."""
+"""`--fetch`: models of a world come from Fuel into its cache. A server on the loopback stands for
+Fuel.
+"""
 
 import hashlib
 import io
@@ -28,7 +30,10 @@ from tests.command import in_process
 
 FUEL = f"https://{HOSTS[0]}/1.0"
 SHAPE = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
-CRATE = f"<sdf version='1.6'><model name='crate'><static>1</static><link name='l'>{SHAPE}</link></model></sdf>"
+CRATE = (
+    "<sdf version='1.6'><model name='crate'><static>1</static><link "
+    f"name='l'>{SHAPE}</link></model></sdf>"
+)
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +63,9 @@ def certificate(tmp_path_factory) -> Path:
 
 
 class Fuel:
-    """What the server answers by path: a body, its headers, and the code; and what it was asked for."""
+    """What the server answers by path: a body, its headers, and the code; and what it was asked
+    for.
+    """
 
     def __init__(self):
         self.answers = {}
@@ -162,7 +169,10 @@ def files_in(folder: Path) -> list[str]:
 
 def test_models_come_with_those_that_they_name_and_gazebo_finds_them_too(fuel, check, cache):
     lamp = f"<include><uri>{FUEL}/Some One/models/Lamp/2</uri></include>"
-    hall = f"<sdf version='1.6'><model name='hall'><static>1</static><link name='l'>{SHAPE}</link>{lamp}</model></sdf>"
+    hall = (
+        "<sdf version='1.6'><model name='hall'><static>1</static><link "
+        f"name='l'>{SHAPE}</link>{lamp}</model></sdf>"
+    )
     body = packed(
         {
             "model.config": "<model><sdf version='1.6'>model.sdf</sdf></model>",
@@ -200,7 +210,8 @@ def test_models_that_a_robot_names_come_too(fuel, cache, tmp_path):
     )
     world = tmp_path / "w.sdf"
     world.write_text(
-        f"<sdf version='1.6'><world name='w'>{CRATE.partition('>')[2].removesuffix('</sdf>')}</world></sdf>"
+        "<sdf version='1.6'><world "
+        f"name='w'>{CRATE.partition('>')[2].removesuffix('</sdf>')}</world></sdf>"
     )
     fuel.has(
         "Wheel",

@@ -12,7 +12,8 @@ from tests.workbench import fake_moments
 from tests.workbench.attached import Attached
 
 GROUND = (
-    "<model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane><normal>0 0 1</normal>"
+    "<model name='ground'><static>true</static><link name='l'><collision "
+    "name='c'><geometry><plane><normal>0 0 1</normal>"
     "<size>50 50</size></plane></geometry></collision></link></model>"
 )
 PLACES = ("--spawn", "0,0,0.15,0", "--goal", "6,0", "--timeout", "12")
@@ -20,7 +21,8 @@ PLACES = ("--spawn", "0,0,0.15,0", "--goal", "6,0", "--timeout", "12")
 
 def box(name, x, y):
     return (
-        f"<collision name='{name}'><pose>{x} {y} 0.4 0 0 0</pose><geometry><box><size>0.4 0.3 0.8</size></box></geometry>"
+        f"<collision name='{name}'><pose>{x} {y} 0.4 0 0 0</pose><geometry><box><size>0.4 0.3 "
+        "0.8</size></box></geometry>"
         "</collision>"
     )
 
@@ -33,12 +35,17 @@ def written(path, shapes, more=""):
 
 @pytest.mark.slow
 def test_what_a_run_has_left_is_reduced_inside_to_the_part_that_stops_the_robot(tmp_path):
-    """A post in the robot's way, in one model with others, which another file holds, beside a crate."""
+    """A post in the robot's way, in one model with others, which another file holds, beside a
+    crate.
+    """
     others = "".join(box(f"far_{number}", 1 + number, 3) for number in range(4))
     crate = (
         f"<model name='crate'><static>true</static><link name='l'>{box('c', 2, -3)}</link></model>"
     )
-    yard = f"<model name='m'><static>true</static><link name='l'>{box('post', 0, 0) + others}</link></model>"
+    yard = (
+        "<model name='m'><static>true</static><link "
+        f"name='l'>{box('post', 0, 0) + others}</link></model>"
+    )
     (tmp_path / "yard").mkdir()
     (tmp_path / "yard" / "model.sdf").write_text(f"<sdf version='1.6'>{yard}</sdf>")
     included = (
@@ -85,7 +92,9 @@ def test_inside_a_run_other_options_are_refused_and_not_ignored(run, command):
 
 
 async def test_a_key_begins_a_run_inside_what_is_left(run, home):
-    """The models of the world are single boxes: that is said in the line of messages, and no file is written."""
+    """The models of the world are single boxes: that is said in the line of messages, and no file
+    is written.
+    """
     fake_moments.finished(run)
     async with Attached(run) as session:
         await session.press("I")

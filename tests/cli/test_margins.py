@@ -1,4 +1,6 @@
-"""`ddenv margins`, and where its table is shown: with the report, the issue of a bundle, the workbench; and a fix as a world."""
+"""`ddenv margins`, and where its table is shown: with the report, the issue of a bundle, the
+workbench; and a fix as a world.
+"""
 
 import json
 import re
@@ -12,11 +14,13 @@ from tests.command import is_one_line
 from tests.workbench import fake_moments
 
 FRICTION = (
-    "crate_00.friction (0.1): f down to 0 (5 of 5 runs), the end of its range; f up to 0.2 (5 of 5 runs), the robot "
+    "crate_00.friction (0.1): f down to 0 (5 of 5 runs), the end of its range; f up to 0.2 (5 of "
+    "5 runs), the robot "
     "reaches its goal at 0.4 (7 of 7 runs)"
 )
 FIX = (
-    "The nearest fix found: crate_00.friction from 0.1 to 0.4, 33 % of its scale; the robot reaches its goal in 20 of 20 "
+    "The nearest fix found: crate_00.friction from 0.1 to 0.4, 33 % of its scale; the robot "
+    "reaches its goal in 20 of 20 "
     "fresh runs"
 )
 
@@ -66,7 +70,8 @@ def test_the_report_outlines_how_far_a_model_may_move_and_has_both_paths(run, tm
     section = page[page.index("<h2>Margins") : page.index("</section>", page.index("<h2>Margins"))]
     assert "paths now and with crate_00.friction = 0.4, seed 0." in section
     signs = re.findall(r'<path class="(until|from|over|now|changed)" d="M[-\d]', section)
-    # Of crate_01.y: no f below, f above, and beyond that it would be inside another model; then the legend has one line of each.
+    # Of crate_01.y: no f below, f above, and beyond that it would be inside another model; then the
+    # legend has one line of each.
     assert Counter(signs) == {"over": 3, "until": 2, "now": 2, "changed": 2}
 
 

@@ -60,7 +60,8 @@ def test_the_command_prints_them_without_what_is_slow(words):
     code = (
         "import sys\nfrom ddenv.cli.command_line import app\n"
         f"app(['schemas', *{words}], standalone_mode=False)\n"
-        "print([name for name in ('sklearn', 'numpy', 'pydrake', 'scipy') if name in sys.modules], file=sys.stderr)"
+        "print([name for name in ('sklearn', 'numpy', 'pydrake', 'scipy') if name in "
+        "sys.modules], file=sys.stderr)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE

@@ -1,4 +1,6 @@
-"""After several runs, `ddenv test` says how often f shows in each environment, for people and for programs."""
+"""After several runs, `ddenv test` says how often f shows in each environment, for people and for
+programs.
+"""
 
 import json
 
@@ -55,7 +57,11 @@ def test_runs_in_another_simulator_are_compared_with_the_certificate():
     found = elsewhere(many, here, "MuJoCo")
     assert [each["fails"] for each in found] == [True, False, None, True]
     assert lines(summary(many), {each["without"]: each["said"] for each in found}) == [
-        "fails in MuJoCo, too: f in 18 of 20 runs (70 % to 97 %); by its certificate f in 29 of 29 fresh runs (88 % to 100 %)",
+        (
+            "fails in MuJoCo, too: f in 18 of 20 runs (70 % to 97 %); by its certificate f in 29 "
+            "of "
+            "29 fresh runs (88 % to 100 %)"
+        ),
         "ball: needed in MuJoCo, too: without it f in 0 of 8 runs (0 % to 32 %); 1 more run broke",
         "wall: not shown for MuJoCo: without it f in 0 of 1 run (0 % to 79 %)",
         "lamp: seems not needed in MuJoCo: without it f in 18 of 20 runs (70 % to 97 %)",

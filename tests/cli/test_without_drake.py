@@ -1,4 +1,6 @@
-"""Where Drake has no wheels, what needs it says so in one line, and all that only looks works. Windows lacks more than Drake."""
+"""Where Drake has no wheels, what needs it says so in one line, and all that only looks works.
+Windows lacks more than Drake.
+"""
 
 import os
 

@@ -49,7 +49,8 @@ def test_the_table_has_a_line_for_each_model_and_its_notes_by_number(world):
 
 def box(name, pose="0 0 0 0 0 0", relative=""):
     return (
-        f"<model name='{name}'><static>1</static><pose{relative}>{pose}</pose><link name='l'><collision name='c'><geometry>"
+        f"<model name='{name}'><static>1</static><pose{relative}>{pose}</pose><link "
+        "name='l'><collision name='c'><geometry>"
         "<box><size>1 1 1</size></box></geometry></collision></link></model>"
     )
 
@@ -234,16 +235,26 @@ def test_it_is_said_where_each_file_was_found_and_how_to_get_those_that_were_not
 NOT_YET = {
     "a.sdf": (
         "<sdf version='1.6'><model name='m'><link name='l'/></model></sdf>",
-        "expected one <world> inside <sdf>, found no <world>; to use its model in a world, name it in one: "
+        "expected one <world> inside <sdf>, found no <world>; to use its model in a world, name "
+        "it in one: "
         "<include><uri>file://{file}</uri></include>",
     ),
     "b.urdf": (
         "<robot name='r'><link name='l'/></robot>",
-        "is a robot in URDF, and no world; name it in one: <include><uri>file://{file}</uri></include>",
+        (
+            "is a robot in URDF, and no world; name it in one: "
+            "<include><uri>file://{file}</uri></include>"
+        ),
     ),
     "c.world.xacro": (
-        "<sdf version='1.6' xmlns:xacro='http://www.ros.org/wiki/xacro'><xacro:arg name='a'/><world name='w'/></sdf>",
-        "is xacro, not SDF; run 'xacro FILE > new.sdf' and name that file ('pip install xacro' brings the command)",
+        (
+            "<sdf version='1.6' xmlns:xacro='http://www.ros.org/wiki/xacro'><xacro:arg "
+            "name='a'/><world name='w'/></sdf>"
+        ),
+        (
+            "is xacro, not SDF; run 'xacro FILE > new.sdf' and name that file ('pip install xacro' "
+            "brings the command)"
+        ),
     ),
 }
 

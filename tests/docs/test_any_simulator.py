@@ -48,7 +48,9 @@ def test_the_command_of_the_page_reduces_the_example_as_the_page_says(reduced):
 
 @pytest.mark.examples
 def test_another_simulator_is_told_from_the_one_of_the_run(reduced, tmp_path):
-    """A robot that drives where nothing stands in its way reaches its goal, so that nothing fails there."""
+    """A robot that drives where nothing stands in its way reaches its goal, so that nothing fails
+    there.
+    """
     drive = SCENARIO.with_name("drive.py").read_text()
     (tmp_path / "drive.py").write_text(drive)
     (tmp_path / "open.py").write_text(drive.replace("obstacles(world)\n    print", "[]\n    print"))

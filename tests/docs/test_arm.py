@@ -1,4 +1,6 @@
-"""The arm among shelves, bins and boxes: its hand gets stuck for the reason that its page names, and it is reduced to that."""
+"""The arm among shelves, bins and boxes: its hand gets stuck for the reason that its page names,
+and it is reduced to that.
+"""
 
 import os
 import re

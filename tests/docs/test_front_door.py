@@ -1,4 +1,6 @@
-"""README is short and shows what the study has; the files and messages that pages for newcomers name are there."""
+"""README is short and shows what the study has; the files and messages that pages for newcomers
+name are there.
+"""
 
 import ast
 import re

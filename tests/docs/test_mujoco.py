@@ -1,4 +1,6 @@
-"""The example of MuJoCo: what it makes of a world, and whether the robot fails there, too, where MuJoCo is installed."""
+"""The example of MuJoCo: what it makes of a world, and whether the robot fails there, too, where
+MuJoCo is installed.
+"""
 
 import math
 import random
@@ -200,7 +202,8 @@ goal: {{x: {goal[0]}, y: {goal[1]}, tolerance: 0.3}}
 controller: {{use: straight, speed: {speed}, motor_gain: 300.0}}
 failure: {{timeout: 20}}
 """
-# Of a platform in the robot's way, m. Between 12 and 15 cm it depends on the run-up whether the robot climbs it.
+# Of a platform in the robot's way, m. Between 12 and 15 cm it depends on the run-up whether the
+# robot climbs it.
 HEIGHTS = [0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.05, 0.08, 0.1, 0.11, 0.17, 0.2, 0.25]
 
 
@@ -219,8 +222,10 @@ def test_on_a_floor_cut_at_random_the_robot_ends_where_it_does_in_mujoco(tmp_pat
         *platform(height, cuts, across, frame),
     ]
     boxes = "".join(
-        f"<model name='{number}'><static>true</static><pose>{numbers(one.pose.position + one.pose.rpy())}</pose>"
-        f"<link name='link'><collision name='c'><geometry><box><size>{numbers(one.shape.size)}</size></box></geometry>"
+        "<model "
+        f"name='{number}'><static>true</static><pose>{numbers(one.pose.position + one.pose.rpy())}</pose>"
+        "<link name='link'><collision "
+        f"name='c'><geometry><box><size>{numbers(one.shape.size)}</size></box></geometry>"
         "</collision></link></model>"
         for number, one in enumerate(floor)
     )

@@ -1,4 +1,6 @@
-"""The guide to robots and controllers of one's own keeps to what is true, and its example works as it says."""
+"""The guide to robots and controllers of one's own keeps to what is true, and its example works as
+it says.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ def test_the_guide_tells_every_field(part):
 
 @pytest.mark.examples
 def test_the_example_is_reduced_to_what_the_guide_says(tmp_path):
-    """On Drake, by the command of the guide; the budget ends it in the certificate, whose fresh runs take most of the time."""
+    """On Drake, by the command of the guide; the budget ends it in the certificate, whose fresh
+    runs take most of the time.
+    """
     environment = os.environ | {"DDENV_HOME": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
     done = ddenv(
         "run", EXAMPLE / "scenario.yaml", "--jobs", "2", "--budget", "24", "--json", env=environment

@@ -1,4 +1,6 @@
-"""The pages name every key and option there is, with its default, and their links lead somewhere."""
+"""The pages name every key and option there is, with its default, and their links lead
+somewhere.
+"""
 
 import re
 import shlex

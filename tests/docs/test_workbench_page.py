@@ -1,4 +1,6 @@
-"""The page of the workbench shows every screen, its pictures are there, and the list of keys is complete."""
+"""The page of the workbench shows every screen, its pictures are there, and the list of keys is
+complete.
+"""
 
 import re
 from importlib import import_module

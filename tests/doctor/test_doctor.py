@@ -1,4 +1,6 @@
-"""`ddenv doctor`: says what is wrong with an installation, a machine or a run, and repairs a run into a copy, never in place."""
+"""`ddenv doctor`: says what is wrong with an installation, a machine or a run, and repairs a run
+into a copy, never in place.
+"""
 
 import json
 import shutil

@@ -68,10 +68,11 @@ def result(outcome: str, seed: int, x: float, cut: bool = False) -> RunResult:
 
 
 class FakePool:
-    """Stands for `ddenv.engine.pool.Pool`; `oracle(models, seed)` says "similar", "other", "pass" or "error".
+    """Stands for `ddenv.engine.pool.Pool`; `oracle(models, seed)` says "similar", "other", "pass"
+    or "error".
 
-    `cut(models, seed)` says "similar" or "other" of a run that is ended early unless it has to be full. Tests finish in an order
-    that `seed` shuffles, as they do on a busy machine.
+    `cut(models, seed)` says "similar" or "other" of a run that is ended early unless it has to be
+    full. Tests finish in an order that `seed` shuffles, as they do on a busy machine.
     """
 
     def __init__(self, oracle: Oracle, jobs: int, seed: int = 0, cut: Cut = lambda *_: "") -> None:
@@ -152,7 +153,9 @@ class FakePool:
 def new_run(
     folder: Path, *, early_stop: bool = False, world: Path = DATA / "wall.sdf", **reduction
 ) -> Path:
-    """A run file of the small world, reduced as printed: the tests know the paper's rounds, and oracles a run by its seed."""
+    """A run file of the small world, reduced as printed: the tests know the paper's rounds, and
+    oracles a run by its seed.
+    """
     usual = PRINTED | CHEAP | {"early_stop": early_stop, "seeds": "consecutive"}
     path = folder / f"run-{len(list(folder.iterdir()))}.ddenv"
     create_run(wall(world=world, reduction=usual | reduction), path)

@@ -17,7 +17,9 @@ def at_once(monkeypatch):
 
 
 class Guided(FakePool):
-    """`guide` is a generator: it is sent the state at each look around, and yields commands as (kind, data), or None to wait."""
+    """`guide` is a generator: it is sent the state at each look around, and yields commands as
+    (kind, data), or None to wait.
+    """
 
     def __init__(self, path, oracle, guide, jobs=1):
         super().__init__(oracle, jobs)

@@ -37,7 +37,9 @@ def story(state):
 
 
 def killed(path, pool, moments, **options):
-    """One engine after another works on the run, each killed after so many events, until one comes to the end."""
+    """One engine after another works on the run, each killed after so many events, until one comes
+    to the end.
+    """
     for moment in moments:
         pool.running.clear()
         try:

@@ -8,7 +8,9 @@ def needs(*names):
 
 
 def flaky(salt, *names):
-    """Shows f in most runs that have the needed models, sometimes something else, always the same for the same run."""
+    """Shows f in most runs that have the needed models, sometimes something else, always the same
+    for the same run.
+    """
 
     def oracle(keep, seed):
         luck = crc32(f"{salt} {sorted(keep)} {seed}".encode()) % 10

@@ -1,4 +1,6 @@
-"""A simulator in which a run looks at some models, one after another: these take part, and no others."""
+"""A simulator in which a run looks at some models, one after another: these take part, and no
+others.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ def wide_world(folder: Path) -> Path:
         '<collision name="c"><geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision>'
     )
     boxes = "".join(
-        f'<model name="{name}"><static>{str(number > 0).lower()}</static><pose>{2 + number % 6} {number // 6 - 2} 0.3 0 0 0</pose>'
+        f'<model name="{name}"><static>{str(number > 0).lower()}</static><pose>{2 + number % 6} '
+        f"{number // 6 - 2} 0.3 0 0 0</pose>"
         f'<link name="link">{inertial}{collision}</link></model>'
         for number, name in enumerate(MODELS)
     )
@@ -32,10 +35,11 @@ def wide_world(folder: Path) -> Path:
 
 @dataclass(frozen=True)
 class Participation:
-    """f shows where all of `needed` are there, in `tenths` of ten runs. Where a tie is broken, a model falls at once.
+    """f shows where all of `needed` are there, in `tenths` of ten runs. Where a tie is broken, a
+    model falls at once.
 
-    A run also looks at `looks` other models, and what it finds decides where it looks next. Of `hidden` models it does not say that
-    they took part.
+    A run also looks at `looks` other models, and what it finds decides where it looks next. Of
+    `hidden` models it does not say that they took part.
     """
 
     salt: int
@@ -74,7 +78,9 @@ class Participation:
         return self.run(keep, seed)[0]
 
     def senses(self, keep: Keep, seed: int) -> dict[str, float]:
-        """When each model is in view. For models that did not affect the run this differs between worlds with equal runs."""
+        """When each model is in view. For models that did not affect the run this differs between
+        worlds with equal runs.
+        """
         met = self.run(keep, seed)[1]
         order = {
             name: crc32(f"{seed} {name} {'' if name in met else sorted(keep)}".encode()) % 100

@@ -1,4 +1,6 @@
-"""What idle workers make ahead of time: it changes no result, whatever their number, and what nobody needs is counted."""
+"""What idle workers make ahead of time: it changes no result, whatever their number, and what
+nobody needs is counted.
+"""
 
 import tempfile
 from pathlib import Path
@@ -37,7 +39,9 @@ METHODS = [
 
 
 def decided(path):
-    """All that a run decided, with the tests that it rests on, as (models, run), and those known as its last search began."""
+    """All that a run decided, with the tests that it rests on, as (models, run), and those known as
+    its last search began.
+    """
     recorded = events(path)
     state = fold(recorded)
 

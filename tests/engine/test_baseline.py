@@ -1,4 +1,6 @@
-"""What the baseline makes of its runs: which failure is f, how often it shows, and when there are enough runs."""
+"""What the baseline makes of its runs: which failure is f, how often it shows, and when there are
+enough runs.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ def way(*points) -> np.ndarray:
 
 
 def ran(*outcomes, spec: FailureSpec = SPEC, wanted: int = 1, chose: int = 0):
-    """What runs show; each is "pass", "error", or the way of a run that failed, with how it failed."""
+    """What runs show; each is "pass", "error", or the way of a run that failed, with how it
+    failed.
+    """
     tests, ways = [], {}
     for run, one in enumerate(outcomes):
         outcome, kind, rows = (
@@ -125,7 +129,8 @@ def test_another_failure_can_be_chosen_by_its_number():
         7: "other",
     }
     assert ran(*runs, wanted=4) == (
-        "there is no failure number 4; 7 runs of the whole world showed these: 1. stuck or out of time at (1.00, 0.00) in 3 runs; "
+        "there is no failure number 4; 7 runs of the whole world showed these: 1. stuck or out "
+        "of time at (1.00, 0.00) in 3 runs; "
         "2. fell at (5.00, 0.00) in 2 runs; 3. lost at (-9.00, 0.00) in 1 run"
     )
 
@@ -150,7 +155,9 @@ def test_the_runs_that_chose_f_are_not_in_its_rate():
 
 
 def rare(rate: float, salt: int):
-    """In this part of its runs the wall stops the robot; in others it ends elsewhere, or the simulation breaks."""
+    """In this part of its runs the wall stops the robot; in others it ends elsewhere, or the
+    simulation breaks.
+    """
 
     def oracle(keep, seed):
         luck = random.Random(f"{salt} {seed}").random()
@@ -162,7 +169,9 @@ def rare(rate: float, salt: int):
 
 
 def last_baseline(folder, oracle, jobs: int, kill_every: int, baseline_runs: int = 4):
-    """The baseline, and the runs made in it, of an engine that is killed and started again all the time."""
+    """The baseline, and the runs made in it, of an engine that is killed and started again all the
+    time.
+    """
     path = new_run(folder, accept_rate="kept", baseline_runs=baseline_runs, iterations=1)
     for _ in range(40):
         pool = FakePool(oracle, jobs)

@@ -1,4 +1,6 @@
-"""Branches: other failures, what was undone, and earlier environments, in a reduction that the user guides."""
+"""Branches: other failures, what was undone, and earlier environments, in a reduction that the user
+guides.
+"""
 
 import random
 
@@ -138,9 +140,9 @@ def test_an_end_above_a_smaller_environment_that_showed_f_says_so(tmp_path):
     assert len(state.environment) > 1
     said = smaller_known(state)
     undone = next(node for node in state.nodes if node.rejected)
-    assert (
-        said
-        == f"a smaller environment is known to show f: 1 model (#{undone.number} in the history, taken back)"
+    assert said == (
+        f"a smaller environment is known to show f: 1 model (#{undone.number} in the "
+        "history, taken back)"
     )
     assert said in ended(state)
     assert smaller_known(drive(new_run(tmp_path), FakePool(needs("wall"), 1))) == ""

@@ -1,4 +1,6 @@
-"""Own simulators under a pool and an engine: they break, hang and are killed, and nothing of them is left."""
+"""Own simulators under a pool and an engine: they break, hang and are killed, and nothing of them
+is left.
+"""
 
 import os
 import signal
@@ -30,7 +32,9 @@ COMMAND = "DDENV_WORLD="
 
 @pytest.fixture(autouse=True)
 def token(tmp_path, monkeypatch):
-    """What stands in the environment of all that the test starts; in the end nothing of it is left."""
+    """What stands in the environment of all that the test starts; in the end nothing of it is
+    left.
+    """
     token = uuid.uuid4().hex
     monkeypatch.setenv(TOKEN, token)
     temporary = tmp_path / "temporary"
@@ -53,7 +57,10 @@ def own_pool(folder: Path, code: str, **options) -> Pool:
 
 
 def test_a_worker_that_is_killed_takes_its_command_along_and_the_next_one_works(tmp_path, token):
-    once = f"import os, sys\nif os.path.exists('again'):\n    print('0,0,0,0,0,0,0,1')\n    sys.exit()\n{FAMILY}"
+    once = (
+        "import os, sys\nif os.path.exists('again'):\n    print('0,0,0,0,0,0,0,1')\n    "
+        f"sys.exit()\n{FAMILY}"
+    )
     pool = own_pool(tmp_path, once + SLEEP)
     try:
         pool.submit(1, Run(keep=EVERYTHING, seed=0))
@@ -144,7 +151,8 @@ def test_a_simulator_that_is_out_of_order_stops_the_engine_and_it_can_go_on(tmp_
     done = _resume(run)
     assert done.returncode == 2
     assert done.stderr == (
-        f"ddenv: {MOST_BROKEN} tests in a row broke; the last one: the command's exit code is 2, neither 0 nor 1: no display; "
+        f"ddenv: {MOST_BROKEN} tests in a row broke; the last one: the command's exit code is 2, "
+        "neither 0 nor 1: no display; "
         f"fix this and continue with 'ddenv resume {run}' (it repeats these tests)\n"
     )
     state = state_of(run)

@@ -33,7 +33,9 @@ every_method = pytest.mark.parametrize(
 
 
 def at_rates(salt, *rates):
-    """Shows f at the rate of the first entry whose models are all there: ({"wall", "beam"}, 1.0), ({"wall"}, 0.25)."""
+    """Shows f at the rate of the first entry whose models are all there: ({"wall", "beam"}, 1.0),
+    ({"wall"}, 0.25).
+    """
 
     def oracle(keep, seed):
         rate = next((rate for needed, rate in rates if needed <= keep), 0.0)
@@ -77,14 +79,17 @@ def test_a_certificate_has_fresh_runs_of_what_is_left_and_without_each_model(tmp
     assert all(test.run >= FIRST_FRESH_RUN for test in fresh)
     assert all(test.run < FIRST_FRESH_RUN for test in state.tests if test.phase != "certify")
     assert state.reason == (
-        "no single model can be removed: f in 11 of 11 fresh runs (65 % to 100 %), at least 66 % of the whole world's rate; "
+        "no single model can be removed: f in 11 of 11 fresh runs (65 % to 100 %), at least 66 % "
+        "of the whole world's rate; "
         "without any one of these 2, f in none of 7 fresh runs each (upper bound: 80 % as often)"
     )
 
 
 @every_method
 def test_an_end_where_f_is_rare_is_left_again(tmp_path, method):
-    """One board shows f in a quarter of the runs, both in all: a quarter is not what the user saw."""
+    """One board shows f in a quarter of the runs, both in all: a quarter is not what the user
+    saw.
+    """
     for salt in range(4):
         oracle = at_rates(salt, ({"wall", "beam"}, 1.0), ({"wall"}, 0.25))
         state = drive(kept(tmp_path, **CHEAP, **method), FakePool(oracle, 2))
@@ -257,7 +262,9 @@ DRIFTING = [
 
 
 def certificates(state):
-    """The certificates, with the models of each claim: environments are numbered as workers come to them."""
+    """The certificates, with the models of each claim: environments are numbered as workers come to
+    them.
+    """
     return [
         (
             replace(certificate, claims=()),

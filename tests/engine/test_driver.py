@@ -81,7 +81,9 @@ def test_what_a_run_noticed_is_recorded_and_looked_at(tmp_path):
 
 @pytest.mark.parametrize("number", [1, 3])
 def test_a_run_that_would_now_go_another_way_is_not_mixed_up(tmp_path, number):
-    """Whichever round it is that differs: nothing is written to the file that would make no sense in it."""
+    """Whichever round it is that differs: nothing is written to the file that would make no sense
+    in it.
+    """
     path = new_run(tmp_path)
     with pytest.raises(Killed):
         drive(path, FakePool(needs("wall", "beam"), 1), prepare=lambda file: kill_after(file, 50))
@@ -101,7 +103,9 @@ def test_a_run_that_would_now_go_another_way_is_not_mixed_up(tmp_path, number):
 
 
 def test_a_veto_of_what_was_known_teaches_a_resumed_run_nothing_else(tmp_path, monkeypatch):
-    """A set was without f in an earlier round, and is vetoed when it comes again: what it taught stays learnt."""
+    """A set was without f in an earlier round, and is vetoed when it comes again: what it taught
+    stays learnt.
+    """
     learnt = []
     learn = Driver._learn
 
@@ -136,7 +140,9 @@ def test_a_veto_of_what_was_known_teaches_a_resumed_run_nothing_else(tmp_path, m
 
 
 def _veto_in(file, round, candidate):
-    """The user vetoes a candidate as soon as its round begins; the engine is killed when the next one begins."""
+    """The user vetoes a candidate as soon as its round begins; the engine is killed when the next
+    one begins.
+    """
     append = file.append
 
     def watched(event, *rest):
@@ -194,7 +200,9 @@ def test_a_robot_that_does_not_fail_ends_the_run(tmp_path):
 
 def test_the_failure_that_the_user_chose_is_reduced(tmp_path):
     def oracle(keep, seed):
-        """The wall stops the robot, but in every third run the ball does so elsewhere, if it is there."""
+        """The wall stops the robot, but in every third run the ball does so elsewhere, if it is
+        there.
+        """
         return (
             "other" if seed % 3 == 0 and "ball" in keep else "similar" if "wall" in keep else "pass"
         )

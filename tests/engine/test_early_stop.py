@@ -1,4 +1,6 @@
-"""Tests that end early: what they accept is run to its end, and whoever refutes them turns early stop off for the run."""
+"""Tests that end early: what they accept is run to its end, and whoever refutes them turns early
+stop off for the run.
+"""
 
 from dataclasses import replace
 
@@ -55,7 +57,9 @@ def test_a_test_that_shows_no_f_to_its_end_turns_early_stop_off(tmp_path):
 
 
 def test_a_certificate_that_refutes_what_early_tests_accepted_turns_early_stop_off(tmp_path):
-    """With the seeds of the search any two of three suffice for f, in full, too. With fresh ones they do not."""
+    """With the seeds of the search any two of three suffice for f, in full, too. With fresh ones
+    they do not.
+    """
     needed = {"wall", "beam", "post"}
 
     def oracle(keep, seed):
@@ -72,7 +76,8 @@ def test_a_certificate_that_refutes_what_early_tests_accepted_turns_early_stop_o
     last = max(test.id for test in state.tests if test.cut)
     assert {test.run for test in state.tests[:last] if test.phase == "certify"} < set(range(12_000))
     assert why_off(state) == (
-        "certificate 2 refutes what tests that ended early accepted: from here on all tests run to their end"
+        "certificate 2 refutes what tests that ended early accepted: from here on all tests run "
+        "to their end"
     )
     with RunFile(path) as file:
         kinds = [recorded.kind for recorded in file.events()]
@@ -82,7 +87,9 @@ def test_a_certificate_that_refutes_what_early_tests_accepted_turns_early_stop_o
 
 
 def test_early_tests_without_f_accept_nothing_that_a_certificate_could_refute(tmp_path):
-    """Any two of three suffice with the seeds of the search. Some tests end early there, and show no f."""
+    """Any two of three suffice with the seeds of the search. Some tests end early there, and show
+    no f.
+    """
     needed = {"wall", "beam", "post"}
 
     def oracle(keep, seed):

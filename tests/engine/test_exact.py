@@ -1,4 +1,6 @@
-"""Chosen runs reduced exactly: what is left fails with a chosen seed, and with none of them without any one model."""
+"""Chosen runs reduced exactly: what is left fails with a chosen seed, and with none of them without
+any one model.
+"""
 
 import tempfile
 from pathlib import Path
@@ -137,13 +139,16 @@ def test_that_runs_repeat_is_asked_once(tmp_path):
     state = drive(exact_run(tmp_path), pool)
     assert pool.made.count((frozenset(ELEMENTS), 0)) == 2
     assert state.reason.startswith(
-        "f shows with seeds 0, 1, 2 each time; without wall it shows with none of the 3 chosen seeds"
+        "f shows with seeds 0, 1, 2 each time; without wall it shows with none of the 3 chosen "
+        "seeds"
     )
 
 
 @pytest.mark.parametrize("what", ["what is left", "a removal"])
 def test_where_a_run_behind_the_result_does_not_repeat_nothing_exact_is_said(tmp_path, what):
-    """The wall alone stops the robot; the first run of a certain world ended otherwise, by chance."""
+    """The wall alone stops the robot; the first run of a certain world ended otherwise, by
+    chance.
+    """
     odd = frozenset({"wall"}) if what == "what is left" else frozenset()
     pool = FakePool(lambda keep, seed: "similar" if "wall" in keep else "pass", 1)
     pool.aside = lambda keep, seed: 1e-9 * pool.made.count((keep, seed)) if keep == odd else 0.0
@@ -272,6 +277,7 @@ def test_to_reduce_one_run_is_offered_with_both_costs_where_all_runs_are_alike_a
     assert "alike" not in notes(1e-12)
     words = notes(0.0)["alike"]
     assert words.startswith(
-        "all 10 runs of the whole world are alike to the last bit: the search and its certificate take"
+        "all 10 runs of the whole world are alike to the last bit: the search and its "
+        "certificate take"
     )
     assert words.endswith("(--accept-rate exact --exact-seeds 1)")

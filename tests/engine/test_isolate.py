@@ -1,4 +1,6 @@
-"""The nearest world that passes: as few models removed as can be, whoever works on it, and with fresh runs of the end."""
+"""The nearest world that passes: as few models removed as can be, whoever works on it, and with
+fresh runs of the end.
+"""
 
 import tempfile
 from contextlib import suppress
@@ -38,7 +40,9 @@ def work(path, pool, prepare=lambda _: None, at_least=None):
 
 
 def any_of(*groups):
-    """f shows wherever all models of any of `groups` are there: that is how a world fails for several reasons."""
+    """f shows wherever all models of any of `groups` are there: that is how a world fails for
+    several reasons.
+    """
     return lambda keep, seed: "similar" if any(group <= keep for group in groups) else "pass"
 
 
@@ -52,7 +56,9 @@ def removed(state):
 
 
 def fresh(state, gone):
-    """The fresh runs without the models `gone`, counted from 0, and how they ended; by the last check."""
+    """The fresh runs without the models `gone`, counted from 0, and how they ended; by the last
+    check.
+    """
     first = state.isolated.asked.run + (len(state.isolated.checks) - 1) * state.isolated.asked.block
     for test in state.tests:
         if (

@@ -22,12 +22,13 @@ from tests.waiting import PATIENCE, PERIOD
 from tests.wall import wall
 
 KILLS = int(os.environ.get("DDENV_KILLS", "6"))
-# An engine is killed within this time after its first test began, and so is one of its workers, s. One engine in so many dies
-# before that, within this time after its workers were started.
+# An engine is killed within this time after its first test began, and so is one of its workers, s.
+# One engine in so many dies before that, within this time after its workers were started.
 LIFE = 3.0
 EARLY, ONE_IN = 1.5, 5
 
-# Fails where the deck and the wall are. It starts no Python: a test takes a few hundredths of a second.
+# Fails where the deck and the wall are. It starts no Python: a test takes a few hundredths of a
+# second.
 ROBOT = """
 echo 0,0,0,0,0,0,0,1
 grep -q 'model name="deck"' "$1" && grep -q 'model name="wall"' "$1" && exit 1
@@ -70,7 +71,9 @@ def how_many_began(run: Path) -> int:
 
 
 def lives(run: Path, dice: random.Random, most: int) -> int:
-    """One engine's life on a run: a worker is killed, and then the engine. Returns how many kills there were, at most `most`."""
+    """One engine's life on a run: a worker is killed, and then the engine. Returns how many kills
+    there were, at most `most`.
+    """
     before = how_many_began(run)
     engine = start_engine(run, 2, anyway="yes")
     kills, began, early = 0, math.inf, dice.randrange(ONE_IN) == 0
@@ -105,7 +108,9 @@ def what_became(run: Path):
 
 
 def came_of(run: Path) -> Counter:
-    """How many engines worked on a run, how many of its tests ended, and how many were broken or lost by kills."""
+    """How many engines worked on a run, how many of its tests ended, and how many were broken or
+    lost by kills.
+    """
     engines = len(told(run, "engine_started"))
     outcomes = Counter(test.outcome for test in state_of(run).tests)
     broken, lost = outcomes.pop("error", 0), outcomes.pop("lost", 0)

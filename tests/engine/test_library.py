@@ -1,4 +1,6 @@
-"""`ddenv.reduce` and the engine make the same decisions on the same oracle and terms: both drive the one procedure."""
+"""`ddenv.reduce` and the engine make the same decisions on the same oracle and terms: both drive
+the one procedure.
+"""
 
 import tempfile
 from collections import Counter
@@ -36,7 +38,9 @@ PAIRS = ["model2model/failure-proximal", "timeseg/timestep", "trajectoryseg/sequ
 
 
 class Oracle:
-    """Shows f in `tenths` of the runs that have the needed models, and now and then in others; notes which models it ran."""
+    """Shows f in `tenths` of the runs that have the needed models, and now and then in others;
+    notes which models it ran.
+    """
 
     def __init__(self, salt, needed, tenths):
         self.salt, self.needed, self.tenths = salt, needed, tenths

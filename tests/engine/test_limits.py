@@ -1,4 +1,6 @@
-"""Simulators that hang, die, take all memory or babble, tests that take too long, engines that die at one place."""
+"""Simulators that hang, die, take all memory or babble, tests that take too long, engines that die
+at one place.
+"""
 
 from collections import Counter
 from contextlib import suppress

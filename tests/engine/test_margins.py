@@ -1,4 +1,6 @@
-"""Margins with workers and a run file: the same table whoever works on it and however often it is killed, within its budget."""
+"""Margins with workers and a run file: the same table whoever works on it and however often it is
+killed, within its budget.
+"""
 
 from contextlib import closing, suppress
 
@@ -33,7 +35,9 @@ GLOBS = ["wall.y", "controller.speed"]
 
 
 def margins_like(keep, seed, changes):
-    """The wall may stand up to 0.7 m to its left, beyond it the robot passes; half of the speed is enough to be lost."""
+    """The wall may stand up to 0.7 m to its left, beyond it the robot passes; half of the speed is
+    enough to be lost.
+    """
     if changes.get("wall.y", 0.0) > 0.7:
         return "pass"
     return "other" if changes.get("controller.speed", 1.0) < 0.5 else "similar"

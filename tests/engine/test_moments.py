@@ -1,4 +1,6 @@
-"""What the user decides at awkward moments: while a reduction waits, one thing right after another, or as the engine is killed."""
+"""What the user decides at awkward moments: while a reduction waits, one thing right after another,
+or as the engine is killed.
+"""
 
 import pytest
 
@@ -17,7 +19,9 @@ def elsewhere(keep, _):
 
 
 def first_waits(before=None):
-    """A guide's beginning: the command `before` in the first round, and on to the first reduction, which waits."""
+    """A guide's beginning: the command `before` in the first round, and on to the first reduction,
+    which waits.
+    """
     yield from until(lambda state: state.round is not None)
     yield "pause", {}
     if before:

@@ -1,4 +1,6 @@
-"""What a night brings: a full disk, a clock that jumps, a run file that is copied, deleted or replaced under an engine."""
+"""What a night brings: a full disk, a clock that jumps, a run file that is copied, deleted or
+replaced under an engine.
+"""
 
 import errno
 import os

@@ -1,4 +1,6 @@
-"""The engine as a program on a disk that takes no more, and stopped with its workers: nothing is lost, nothing counts as late."""
+"""The engine as a program on a disk that takes no more, and stopped with its workers: nothing is
+lost, nothing counts as late.
+"""
 
 import os
 import resource
@@ -16,7 +18,8 @@ from tests.engine.reading import state_of
 from tests.waiting import wait_until
 from tests.wall import wall
 
-# Maximum real time of a test, s: a machine that does much else takes a second for what takes a tenth alone.
+# Maximum real time of a test, s: a machine that does much else takes a second for what takes a
+# tenth alone.
 LIMIT = 8.0
 # What a file may still grow by, bytes.
 LEFT = 65_536

@@ -176,7 +176,9 @@ class Silent:
 
 
 class Clock:
-    """The clock that a pool looks at: `looks` for some seconds and returns what has ended by then."""
+    """The clock that a pool looks at: `looks` for some seconds and returns what has ended by
+    then.
+    """
 
     def __init__(self, pool, monkeypatch):
         self.now, self.pool = 1000.0, pool

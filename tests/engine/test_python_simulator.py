@@ -1,4 +1,6 @@
-"""A simulator in Python in a worker: one object until a test breaks, then a new worker, and no file is left."""
+"""A simulator in Python in a worker: one object until a test breaks, then a new worker, and no file
+is left.
+"""
 
 from pathlib import Path
 

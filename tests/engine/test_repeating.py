@@ -1,4 +1,6 @@
-"""A run that is resumed with other software or on another processor: its first test is made again and compared."""
+"""A run that is resumed with other software or on another processor: its first test is made again
+and compared.
+"""
 
 import sqlite3
 from contextlib import suppress
@@ -32,7 +34,9 @@ def begun(tmp_path):
 
 
 def resumed(path, kill=True, **options):
-    """What an engine makes that goes on with the run, until it is killed, and the state after it."""
+    """What an engine makes that goes on with the run, until it is killed, and the state after
+    it.
+    """
     pool = FakePool(needs("wall", "beam"), 1)
     with suppress(Killed):
         drive(path, pool, prepare=lambda file: kill and kill_after(file, 20), **options)
@@ -139,10 +143,14 @@ def test_the_command_offers_to_go_on_or_to_make_all_tests_again(home):
     run = home / "runs" / "wall-1.ddenv"
     assert ddenv("run", DATA / "wall.yaml", "--budget", 6).returncode == 1
     with sqlite3.connect(run) as db:
-        text = 'UPDATE event SET data = replace(data, \'"simulator":"drake \', \'"simulator":"drake 0.\')'
+        text = (
+            'UPDATE event SET data = replace(data, \'"simulator":"drake \', \'"simulator":"drake '
+            "0.')"
+        )
         db.execute(f"{text} WHERE kind = 'engine_started'")
         db.execute(
-            "UPDATE motion SET samples = (SELECT samples FROM motion WHERE test = 2 AND model = '') WHERE test = 1"
+            "UPDATE motion SET samples = (SELECT samples FROM motion WHERE test = 2 AND model = "
+            "'') WHERE test = 1"
         )
     refused = ddenv("resume", run)
     assert refused.returncode == 2 and refused.stderr.count("\n") == 1

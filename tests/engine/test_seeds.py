@@ -1,4 +1,6 @@
-"""Which seed a run has: unlike those of its neighbours, the same for all candidates, and in old files as it was there."""
+"""Which seed a run has: unlike those of its neighbours, the same for all candidates, and in old
+files as it was there.
+"""
 
 import pytest
 
@@ -16,7 +18,9 @@ RULES = pytest.mark.parametrize("seeds", ["hashed", "consecutive"])
 
 
 def half(keep, seed):
-    """f in half of all runs, by the first number of the simplest generator: it hardly differs for seeds in a row."""
+    """f in half of all runs, by the first number of the simplest generator: it hardly differs for
+    seeds in a row.
+    """
     return "similar" if (16_807 * seed + 1) % (2**31 - 1) < 2**30 else "pass"
 
 

@@ -1,4 +1,6 @@
-"""Which models rest on which: found once before the first test, known to views, and kept together where the user asks for it."""
+"""Which models rest on which: found once before the first test, known to views, and kept together
+where the user asks for it.
+"""
 
 import pytest
 

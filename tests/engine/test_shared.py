@@ -1,4 +1,6 @@
-"""Tests that another run has made are taken over where they would be the same to the last bit, and only there."""
+"""Tests that another run has made are taken over where they would be the same to the last bit, and
+only there.
+"""
 
 import json
 import shutil
@@ -167,7 +169,9 @@ def test_of_another_simulator_nothing_is_taken_over(made, fresh, monkeypatch):
 
 
 def test_no_other_run_takes_what_was_ended_early(tmp_path):
-    """All that can be cut is: only the baseline, what was accepted and what confirms are known in full."""
+    """All that can be cut is: only the baseline, what was accepted and what confirms are known in
+    full.
+    """
     oracle = needs("wall", "beam")
     cut = {"cut": lambda keep, seed: "similar" if {"wall", "beam"} <= keep else "other"}
     first = drive(new_run(tmp_path, early_stop=True, **METHOD), FakePool(oracle, 1, **cut))
@@ -219,7 +223,10 @@ DAMAGED = {
     "no run file": None,
     "no events": "DELETE FROM event",
     "no JSON": "UPDATE event SET data = 'x' WHERE kind = 'test_finished'",
-    "no robot": "UPDATE event SET data = json_set(data, '$.scenario.robot', json('null')) WHERE kind = 'created'",
+    "no robot": (
+        "UPDATE event SET data = json_set(data, '$.scenario.robot', json('null')) WHERE kind = "
+        "'created'"
+    ),
     "no scenario": "UPDATE event SET data = json_set(data, '$.scenario', 3) WHERE kind = 'created'",
     "no elements": "UPDATE event SET data = json_remove(data, '$.elements') WHERE kind = 'created'",
     "no such test": "UPDATE event SET data = json_set(data, '$.test', 99) WHERE kind = 'test_finished'",

@@ -1,4 +1,6 @@
-"""Slices: a test that a finished run implies is not made, what took no part goes without one, and audits find what is wrong."""
+"""Slices: a test that a finished run implies is not made, what took no part goes without one, and
+audits find what is wrong.
+"""
 
 import tempfile
 from pathlib import Path

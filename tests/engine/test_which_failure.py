@@ -1,4 +1,6 @@
-"""Which failure it is: two within epsilon, ends that scatter, one that does not repeat, another epsilon or failure midway."""
+"""Which failure it is: two within epsilon, ends that scatter, one that does not repeat, another
+epsilon or failure midway.
+"""
 
 import pytest
 
@@ -38,7 +40,8 @@ def test_two_failures_within_epsilon_are_named_and_none_takes_the_place_of_the_o
 ):
     state = slipped(new_run(tmp_path, accept_rate="kept", baseline_runs=10, keep_rate=0.8), jobs)
     assert dict(state.notes)["two failures"] == (
-        "the ends of f form two groups 0.3 m apart (6, 4 runs): these may be different failures; --epsilon 0.15 tells them apart"
+        "the ends of f form two groups 0.3 m apart (6, 4 runs): these may be different failures; "
+        "--epsilon 0.15 tells them apart"
     )
     assert state.environment == ("beam",)
     certificate = state.certificate
@@ -52,8 +55,10 @@ def test_two_failures_within_epsilon_are_named_and_none_takes_the_place_of_the_o
     assert not is_minimal(certificate)
     assert not state.minimal
     assert verdict_on(certificate).startswith(
-        "what is left may show another failure within epsilon: of the runs of the whole world with f 6 of 10 ended in one place, "
-        f"of what is left 0 of {runs} did, and others ended 0.3 m away; --epsilon 0.15 tells them apart; "
+        "what is left may show another failure within epsilon: of the runs of the whole world "
+        "with f 6 of 10 ended in one place, "
+        f"of what is left 0 of {runs} did, and others ended 0.3 m away; --epsilon 0.15 tells "
+        "them apart; "
     )
 
 
@@ -112,7 +117,10 @@ def test_a_failure_that_stops_to_show_ends_the_search_after_a_round_in_vain(tmp_
     pool.oracle = warm(pool)
     with pytest.raises(
         UserError,
-        match=r"f does not repeat: it showed only in the first 10 runs, and in none of 3 replays; does",
+        match=(
+            r"f does not repeat: it showed only in the first 10 runs, and in none of 3 replays; "
+            r"does"
+        ),
     ):
         simulated_elsewhere(path, pool)
     assert len(pool.made) <= 30
@@ -261,5 +269,6 @@ def test_a_robot_that_fails_without_any_model_is_told(tmp_path):
     )
     assert not state.environment
     assert state.reason.startswith(
-        "fails without any model: look at the ground, the robot, its controller, or something that is "
+        "fails without any model: look at the ground, the robot, its controller, or something "
+        "that is "
     )

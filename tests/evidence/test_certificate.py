@@ -51,7 +51,8 @@ FIRST = error_of(1)
 
 
 def outcomes(rates, salt, breaks=0.0, together=0.0):
-    """Runs of the whole world, of what is left and of that without a model: the same whenever they are asked for.
+    """Runs of the whole world, of what is left and of that without a model: the same whenever they
+    are asked for.
 
     With a share `together` of all seeds, all of them have the same luck.
     """
@@ -132,7 +133,9 @@ def test_a_run_that_was_not_made_counts_against_what_is_claimed(pairs):
     salt=salts,
 )
 def test_a_broken_run_never_helps_a_claim(procedure, terms, rates, salt):
-    """Of what is left it counts as a miss, and as f of the whole world and of that without a model."""
+    """Of what is left it counts as a miss, and as f of the whole world and of that without a
+    model.
+    """
     against = {WHOLE: True, LEFT: False, REST: True}
     shown, breaking = outcomes(rates, salt), random.Random(salt)
     broken = {(one, run) for one in RATES for run in range(MOST_PAIRS) if breaking.random() < 0.02}
@@ -228,7 +231,9 @@ def test_without_a_model_that_helps_f_is_shown_to_be_rarer():
 
 @pytest.mark.parametrize(("rate", "without"), [(0.05, 0.0), (0.1, 0.3), (0.3, 0.7)])
 def test_a_model_is_said_to_help_only_a_little_where_f_is_shown_to_stay_frequent(rate, without):
-    """Too rare for a verdict, f is shown to be rarer without a needed model, and by how much is not shown."""
+    """Too rare for a verdict, f is shown to be rarer without a needed model, and by how much is not
+    shown.
+    """
     rates = (rate, rate, without * rate)
     verdicts = Counter(
         settle(falls(REST, LEFT, FIRST), outcomes(rates, salt)).verdict for salt in range(60)

@@ -1,4 +1,6 @@
-"""What a run claims of its result is worded in one place, and claims nothing of models that were never left out."""
+"""What a run claims of its result is worded in one place, and claims nothing of models that were
+never left out.
+"""
 
 import json
 from dataclasses import replace
@@ -72,9 +74,9 @@ def test_the_sentence_says_how_many_were_left_out(pinned):
     said = fold(pinned.file.events()).reason
     assert said.startswith("no other single model can be removed: f in 23 of 23 fresh runs")
     assert (
-        f"without any one of these 2, f in none of 11 fresh runs each (upper bound: 55 % as often); {PINNED}"
-        in said
-    )
+        "without any one of these 2, f in none of 11 fresh runs each (upper bound: 55 % as "
+        f"often); {PINNED}"
+    ) in said
 
 
 def test_a_single_model_that_was_left_out_is_named(pinned):

@@ -1,4 +1,5 @@
-"""How often a claim is false where it is hardest: at the border of what it says, with seeds that share their luck, and broken runs.
+"""How often a claim is false where it is hardest: at the border of what it says, with seeds that
+share their luck, and broken runs.
 
 `DDENV_CLAIMS=1000` simulates so many certificates and reductions of each kind.
 """
@@ -62,8 +63,9 @@ TERMS = Terms(certify_rate=2 / 3, keep_rate=0.8, error=error_of(1), at_least=10)
 class World:
     """The true rates of f in the whole world, in what is left, and in that without a model.
 
-    A share `together` of the seeds has the same luck in all of them. A share `breaks` of the runs of what is left breaks where it
-    would have missed f, and as many of the runs without a model where they would have shown it: the worst that breaking can do.
+    A share `together` of the seeds has the same luck in all of them. A share `breaks` of the runs
+    of what is left breaks where it would have missed f, and as many of the runs without a model
+    where they would have shown it: the worst that breaking can do.
     """
 
     whole: float
@@ -88,7 +90,9 @@ class World:
 
 @pytest.fixture
 def check(record_property):
-    """Fails if so many false sentences are unlikely where each is false with a chance of `error`; conftest.py prints all."""
+    """Fails if so many false sentences are unlikely where each is false with a chance of `error`;
+    conftest.py prints all.
+    """
 
     def counted(false, error, simulated=SIMULATED, sentence=""):
         chance = binomtest(false, simulated, error, alternative="greater").pvalue
@@ -142,7 +146,9 @@ TOGETHER = {
 
 @pytest.mark.parametrize(("world", "terms"), TOGETHER.values(), ids=TOGETHER)
 def test_what_is_said_of_the_rate_and_of_a_model_together_is_rarely_false(world, terms, check):
-    """One share of the error is enough for both, as the model has its turn only when the rate is shown to be kept."""
+    """One share of the error is enough for both, as the model has its turn only when the rate is
+    shown to be kept.
+    """
     false = 0
     for salt in range(SIMULATED):
         kept = settle(keeps(LEFT, WHOLE, terms), world.shown(salt))
@@ -166,7 +172,8 @@ WITHOUT = {
         "needed, usual": World(0.9, 0.9, 0.72),
     }.items()
 }
-# "Not needed" has no error: docs/statistics.md says in how many cases it is wrong where it is wrong often.
+# "Not needed" has no error: docs/statistics.md says in how many cases it is wrong where it is wrong
+# often.
 SEEMS = 0.4
 
 
@@ -255,7 +262,9 @@ IN_TIME = {
 @pytest.mark.parametrize("in_time", IN_TIME.values(), ids=IN_TIME)
 @pytest.mark.parametrize("rate", LOOPS.values(), ids=LOOPS)
 def test_all_claims_of_a_whole_reduction_are_rarely_false(rate, in_time, check):
-    """Also where f gets rarer with each call of the test, or alternates, in all that is kept alike."""
+    """Also where f gets rarer with each call of the test, or alternates, in all that is kept
+    alike.
+    """
     false = 0
     for salt in range(LONGER):
         draw, calls = random.Random(salt), count()
@@ -278,8 +287,8 @@ def test_all_claims_of_a_whole_reduction_are_rarely_false(rate, in_time, check):
 class Lucky(driving.World):
     """A share `together` of the seeds has the same luck in all environments.
 
-    With `competes` another failure is as frequent in the whole world, and f is the luckier one of the first runs. A share `crashes`
-    of the runs with f breaks.
+    With `competes` another failure is as frequent in the whole world, and f is the luckier one of
+    the first runs. A share `crashes` of the runs with f breaks.
     """
 
     together: float = 0.0
@@ -332,14 +341,17 @@ REDUCTIONS = {
 
 @pytest.mark.parametrize("world", REDUCTIONS.values(), ids=REDUCTIONS)
 def test_what_a_whole_reduction_says_is_rarely_false(world, check):
-    """Where each of two models takes a bit more of the rate than a needed one has to, and than the search may lose."""
+    """Where each of two models takes a bit more of the rate than a needed one has to, and than the
+    search may lose.
+    """
     said, false = Counter(), Counter()
     for seed in range(LONGER):
         one = replace(world, seed=seed)
         driver = driving.Driver(one)
         driver.drive(procedure(driver, one.whole, one.baseline_runs, keeps_rate=True))
         told = list(sentences(one, driver))
-        # One chance in a reduction, however many of its certificates say the same: the seeds of one are shared.
+        # One chance in a reduction, however many of its certificates say the same: the seeds of one
+        # are shared.
         said += Counter({kind for kind, _ in told})
         false += Counter({kind for kind, true in told if not true})
     assert said["bound"] > LONGER / 2
@@ -380,7 +392,9 @@ def sentences(world, driver):
 
 @pytest.mark.parametrize("share", [0.801, 0.82])
 def test_models_that_are_called_needed_beside_others_that_only_help_are_rarely_not(share, check):
-    """The runs choose of which of ten models "minimal but for" is said: the error is that of all of them."""
+    """The runs choose of which of ten models "minimal but for" is said: the error is that of all of
+    them.
+    """
     false = 0
     for seed in range(LONGER):
         ten = driving.World(
@@ -447,7 +461,8 @@ def test_the_goal_is_rarely_said_to_be_reached_to_the_end_where_it_is_not(rate, 
     check(false, ERROR, LONGER, sentence="to the end")
 
 
-# At each value of a number: the share of its rate at which f shows, and the chance that the robot reaches its goal.
+# At each value of a number: the share of its rate at which f shows, and the chance that the robot
+# reaches its goal.
 VALUES = {
     "f is all but gone": (GONE, 0.0),
     "f still shows": (SHOWS, 0.0),
@@ -459,7 +474,9 @@ VALUES = {
 @pytest.mark.parametrize("rate", [1.0, 0.7])
 @pytest.mark.parametrize(("share", "goal"), VALUES.values(), ids=VALUES)
 def test_what_margins_say_of_the_values_of_a_number_is_rarely_false(share, goal, rate, check):
-    """That f shows up to a value, that it is gone at one, and that the robot reaches its goal at one: all of a call together."""
+    """That f shows up to a value, that it is gone at one, and that the robot reaches its goal at
+    one: all of a call together.
+    """
     asked, false = NumberAsked(name="x", now=0.5, low=0.0, high=1.0, scale=1.0, resolution=0.01), 0
     rule = Rule(rate, error_each(rate, MOST_OF_NUMBER))
     wrong = {"f"} if share <= GONE else {"other", "goal"}
@@ -502,7 +519,9 @@ PAIRS = 10
 
 @pytest.mark.parametrize("world", FORECAST.values(), ids=FORECAST)
 def test_about_eight_of_ten_certificates_take_as_many_tests_as_forecast(world, check):
-    """At the start in the worlds that it takes for granted; once a model has some pairs, in any world."""
+    """At the start in the worlds that it takes for granted; once a model has some pairs, in any
+    world.
+    """
     at_first, later = Counter(), Counter()
     for salt in range(LONGER):
         took, first, from_here = forecasts(world.shown(salt))
@@ -516,7 +535,9 @@ def test_about_eight_of_ten_certificates_take_as_many_tests_as_forecast(world, c
 
 
 def forecasts(shown, models=3):
-    """How many tests a certificate takes, and its forecasts: after a baseline of ten runs, and after ten pairs without a model."""
+    """How many tests a certificate takes, and its forecasts: after a baseline of ten runs, and
+    after ten pairs without a model.
+    """
     seen = sum(shown(WHOLE, -1 - run) is True for run in range(10))
     first = certificate_tests(
         estimated_rate(seen, 10), TERMS.certify_rate, models, TERMS.at_least, 10
@@ -542,7 +563,8 @@ def forecasts(shown, models=3):
     return len(made), first, from_here
 
 
-# What a run meets beside five usual models: the chance, of how many groups of models one, and how many are in each.
+# What a run meets beside five usual models: the chance, of how many groups of models one, and how
+# many are in each.
 MEETS = {"a detour": (0.1, 1, 12), "one of many": (0.3, 300, 1), "another group": (0.2, 50, 10)}
 
 

@@ -1,4 +1,6 @@
-"""Margins: what is found of a number covers the truth, whatever the rate of f; and it asks for few runs, each in its turn."""
+"""Margins: what is found of a number covers the truth, whatever the rate of f; and it asks for few
+runs, each in its turn.
+"""
 
 import itertools
 import math
@@ -25,7 +27,9 @@ ERROR = 0.05 / 15
 def explored(
     asked, rate, runs_of, most=MOST_OF_NUMBER, impossible=lambda value: False, chosen=None
 ):
-    """The margin of a number whose run i at a value ends as `runs_of(value, i)`; runs end in any order with `chosen`."""
+    """The margin of a number whose run i at a value ends as `runs_of(value, i)`; runs end in any
+    order with `chosen`.
+    """
     rule, made, refused = Rule(rate, ERROR), {}, {}
     while True:
         known = Known(
@@ -49,7 +53,9 @@ def explored(
 
 
 def planted(asked, rate, limit, goal, salt):
-    """f shows at `rate` below `limit`, and from `goal` on the robot nearly always reaches its goal."""
+    """f shows at `rate` below `limit`, and from `goal` on the robot nearly always reaches its
+    goal.
+    """
 
     def outcome(value, run):
         random_one = random.Random(f"{salt} {value} {run}")

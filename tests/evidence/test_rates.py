@@ -58,7 +58,8 @@ def test_runs_decide_between_a_rate_and_half_of_it_and_are_seldom_wrong(rate, fa
     chance = random.Random(seed)
     p = rate if fails else rate / 2
     said = [shows_at((chance.random() < p for _ in range(400)), rate) for _ in range(60)]
-    # Each is wrong with at most about 1 %: seven of sixty would be so by chance once in ten million times.
+    # Each is wrong with at most about 1 %: seven of sixty would be so by chance once in ten million
+    # times.
     assert sum(each is not fails for each in said) < 7
 
 

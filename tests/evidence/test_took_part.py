@@ -52,7 +52,8 @@ def test_a_slice_is_told_with_the_chance_that_a_fresh_run_meets_what_went(moment
     gone = len(before.environment) - len(after.environment)
     line = news("sliced", before, after)
     assert line.startswith(
-        f"  reduced to {len(after.environment)} models: {gone} models cannot have affected any of the 3 runs"
+        f"  reduced to {len(after.environment)} models: {gone} models cannot have affected any "
+        "of the 3 runs"
     )
     assert "the chance that a fresh run meets a model not met before is " in line
     assert slice_in_short(after, after.here).startswith(
@@ -68,9 +69,9 @@ def test_the_workbench_teaches_what_is_implied(moments):
     recorded, _, implied = first(moments, "implied")
     said = " ".join(explain(Snapshot(state=implied, live=(), engine="alive")).sentences)
     assert (
-        f"Test {recorded.event.test} is implied by test {recorded.event.by}: no model it lacks affected that run."
-        in said
-    )
+        f"Test {recorded.event.test} is implied by test {recorded.event.by}: no model it lacks "
+        "affected that run."
+    ) in said
 
 
 def test_the_row_of_a_candidate_names_the_run_that_implies_its_test(moments):

@@ -1,4 +1,6 @@
-"""The rules of what may be decided: the engine obeys what they allow, and refuses the rest in the same words."""
+"""The rules of what may be decided: the engine obeys what they allow, and refuses the rest in the
+same words.
+"""
 
 import tempfile
 import threading
@@ -108,7 +110,9 @@ def test_data_that_makes_no_sense_is_no_command(kind, data, why):
 
 
 def begun(folder, salt, plan, moment, mode):
-    """The file of a run that was guided by `plan` until its engine was killed after so many events."""
+    """The file of a run that was guided by `plan` until its engine was killed after so many
+    events.
+    """
     path, plan = new_run(Path(folder)), sorted(plan, key=lambda one: one[0])
     pool = Disturbed(path, flaky(salt, "wall", "beam"), 2, plan, salt)
     with closing(pool.viewer):

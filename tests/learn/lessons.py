@@ -26,7 +26,9 @@ def course(number: int, score: Score | None = None) -> Course:
 
 
 def through(walk: Course, answer) -> Course:
-    """Goes to the end; `answer(question)` returns the place of an answer, or None to skip. Who answers right searches well."""
+    """Goes to the end; `answer(question)` returns the place of an answer, or None to skip. Who
+    answers right searches well.
+    """
     for _ in range(500):
         if walk.step == walk.last:
             return walk

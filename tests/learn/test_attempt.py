@@ -1,4 +1,6 @@
-"""A student's own search: its verdict is that of the oracle, its moves are kept, and a comparison says what it was worth."""
+"""A student's own search: its verdict is that of the oracle, its moves are kept, and a comparison
+says what it was worth.
+"""
 
 import math
 from dataclasses import asdict
@@ -26,7 +28,9 @@ def shows(models):
 
 
 def tried(moves, budget=20):
-    """A search that tries to leave out these models, one group after another, and says that it is done."""
+    """A search that tries to leave out these models, one group after another, and says that it is
+    done.
+    """
     attempt = Attempt(ORACLE, budget)
     for out in moves:
         try:

@@ -1,4 +1,6 @@
-"""Figures and places of lessons, counted again from the tests and events of a run with three certificates."""
+"""Figures and places of lessons, counted again from the tests and events of a run with three
+certificates.
+"""
 
 import pytest
 

@@ -1,4 +1,6 @@
-"""What can be foretold, and what is said of each answer, is what the run did: at every moment of every recorded run."""
+"""What can be foretold, and what is said of each answer, is what the run did: at every moment of
+every recorded run.
+"""
 
 import pytest
 

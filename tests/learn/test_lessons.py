@@ -1,4 +1,6 @@
-"""The lessons that come with ddenv: whole, true, small, and free of everything that only some systems have."""
+"""The lessons that come with ddenv: whole, true, small, and free of everything that only some
+systems have.
+"""
 
 import os
 import subprocess

@@ -1,4 +1,6 @@
-"""Searches side by side: recorded ones repeat, those of run files are as recorded, and the reason for a win adds up."""
+"""Searches side by side: recorded ones repeat, those of run files are as recorded, and the reason
+for a win adds up.
+"""
 
 import json
 import shutil

@@ -1,4 +1,6 @@
-"""Opens lessons, a real run with its map, scene and report, and a race; the caller has blocked what Windows lacks."""
+"""Opens lessons, a real run with its map, scene and report, and a race; the caller has blocked what
+Windows lacks.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Models and paths as pixels and cells; thousands of models at once are drawn as each one would be by itself."""
+"""Models and paths as pixels and cells; thousands of models at once are drawn as each one would be
+by itself.
+"""
 
 from __future__ import annotations
 
@@ -232,7 +234,8 @@ def test_many_large_models_on_top_of_each_other_are_drawn_in_parts(monkeypatch):
     assert set(np.unique(grid)) == {8}
 
 
-# Models thinner than a pixel are drawn without gaps, and gaps between models stay seen, wherever the pixels fall.
+# Models thinner than a pixel are drawn without gaps, and gaps between models stay seen, wherever
+# the pixels fall.
 
 DARK = (15, 20, 27), (213, 219, 229)
 

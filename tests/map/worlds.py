@@ -7,7 +7,8 @@ from ddenv.world.model import World
 from ddenv.world.sdf.read import parse_world
 
 GROUND = (
-    '<model name="ground_plane"><static>true</static><link name="link"><collision name="plane"><geometry>'
+    '<model name="ground_plane"><static>true</static><link name="link"><collision '
+    'name="plane"><geometry>'
     "<plane><normal>0 0 1</normal></plane></geometry></collision></link></model>"
 )
 

@@ -1,4 +1,6 @@
-"""A driver of the procedure for tests: workers that end in any order, over an oracle that draws each run from its seed."""
+"""A driver of the procedure for tests: workers that end in any order, over an oracle that draws
+each run from its seed.
+"""
 
 from __future__ import annotations
 
@@ -24,10 +26,11 @@ FIRST_FRESH, EACH_CERTIFICATE = 10_000, 2_000
 
 @dataclass(frozen=True)
 class World:
-    """Models of which f needs some. Without each `useful` one it is rarer; a share of all runs breaks.
+    """Models of which f needs some. Without each `useful` one it is rarer; a share of all runs
+    breaks.
 
-    Models with the same label in `labels` are a stack; those with the label `pinned` always stay. With `keeps_rate` the search
-    keeps the rate of f, else the first run with f decides.
+    Models with the same label in `labels` are a stack; those with the label `pinned` always stay.
+    With `keeps_rate` the search keeps the rate of f, else the first run with f decides.
     """
 
     labels: tuple[int, ...]
@@ -72,7 +75,8 @@ class Known:
     """What a run file would hold: the outcomes of tests, and what was decided."""
 
     outcomes: dict[tuple[Environment, int], bool | str] = field(default_factory=dict)
-    # The winner's place of each round that is over, and candidates that tests which broke left open, as (round, environment).
+    # The winner's place of each round that is over, and candidates that tests which broke left
+    # open, as (round, environment).
     past: dict[int, int | None] = field(default_factory=dict)
     unknown: set[tuple[int, Environment]] = field(default_factory=set)
 
@@ -98,8 +102,9 @@ class Killed(Exception):
 class Driver:
     """Makes the tests of `outcome` with so many workers; `order` says which of them end first.
 
-    `facts` are what it was asked or told that is no test, each with the method's name first; `steps` counts these and its wants.
-    At a step `interrupt` raises an exception, (step, exception).
+    `facts` are what it was asked or told that is no test, each with the method's name first;
+    `steps` counts these and its wants. At a step `interrupt` raises an exception, (step,
+    exception).
     """
 
     def __init__(
@@ -194,7 +199,9 @@ class Driver:
     next_leg = leg
 
     def drive(self, work, most=None):
-        """Carries it to its end, and returns what it returns; None if it was killed, or after `most` steps."""
+        """Carries it to its end, and returns what it returns; None if it was killed, or after
+        `most` steps.
+        """
         go = partial(next, work)
         while most is None or self.steps < most:
             try:

@@ -105,7 +105,8 @@ def test_an_empty_world_needs_no_round(algorithm):
 @given(world=worlds)
 @examples(0.4)
 def test_what_is_implied_is_tried_only_to_prove_the_end_minimal(world):
-    """With `skip: implied`, no subset of an environment without f is tried, but for one without a single model.
+    """With `skip: implied`, no subset of an environment without f is tried, but for one without a
+    single model.
 
     Nor that one where a certificate will show what is needed.
     """

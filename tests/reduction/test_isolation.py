@@ -1,4 +1,6 @@
-"""Isolation as a pure search: what it removes lets the robot pass, and not with any one model of it put back."""
+"""Isolation as a pure search: what it removes lets the robot pass, and not with any one model of it
+put back.
+"""
 
 import random
 from dataclasses import replace
@@ -102,7 +104,9 @@ def test_fresh_runs_that_do_not_decide_show_nothing():
 
 
 def isolated(world, passing, rates=(1.0, 0.0), checks=(), **options):
-    """A driver of the isolation of a world, and what has to go; runs reach the goal at one rate or the other."""
+    """A driver of the isolation of a world, and what has to go; runs reach the goal at one rate or
+    the other.
+    """
     driver = Driver(world, **options)
 
     def reached(environment, run):

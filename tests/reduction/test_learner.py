@@ -89,7 +89,9 @@ def test_a_large_model_is_near_where_its_box_may_be():
 
 
 def test_it_learns_what_needed_models_are_like():
-    """Slippery models are to blame, wherever they stand: seen in tests of some, believed of the others."""
+    """Slippery models are to blame, wherever they stand: seen in tests of some, believed of the
+    others.
+    """
     rng = np.random.default_rng(5)
     elements = tuple(f"m{index}" for index in range(40))
     positions = {name: (*rng.uniform(-5, 5, 2), 0.0) for name in elements}
@@ -124,9 +126,11 @@ def test_it_learns_what_needed_models_are_like():
 
 
 def followed(weights):
-    """Chances from the first rounds of many reductions, the prior's beside them, and whether the models are needed.
+    """Chances from the first rounds of many reductions, the prior's beside them, and whether the
+    models are needed.
 
-    `weights` (30,) say how likely the model at each rank of nearness to the failure is one of the three that are needed.
+    `weights` (30,) say how likely the model at each rank of nearness to the failure is one of the
+    three that are needed.
     """
     learnt, at_first, truth = [], [], []
     for seed in range(60):
@@ -163,7 +167,9 @@ def followed(weights):
 
 @pytest.mark.rates
 def test_its_chances_are_right_on_average():
-    """Of all models that it gives a chance of about a half while it works, about a half are needed, and so on."""
+    """Of all models that it gives a chance of about a half while it works, about a half are needed,
+    and so on.
+    """
     learnt, _, needed = followed(1.0 / np.arange(1, 31))
     for low, high in ((0.0, 0.05), (0.05, 0.15), (0.15, 0.35), (0.35, 0.65), (0.65, 1.0)):
         inside = (learnt >= low) & (learnt < high)

@@ -184,7 +184,9 @@ def test_nothing_that_lost_the_rate_is_taken_again(world):
 
 
 def place(world, chain, certified, rate):
-    """The last environment with the rate of all runs of the whole world, by the seeds of a certificate."""
+    """The last environment with the rate of all runs of the whole world, by the seeds of a
+    certificate.
+    """
     first, lost = certified.certificate.first_run, certified.claims[0].runs
 
     def fresh(environment, run):

@@ -141,7 +141,9 @@ def test_the_rate_is_kept_and_each_claim_says_what_its_fresh_runs_showed(salt, a
 
 
 def test_the_certificate_calls_each_world_once_in_a_block_and_draws_the_order():
-    """Six needed elements and a failure that always shows: 11 pairs for the rate, 7 for each element, 64 calls in all."""
+    """Six needed elements and a failure that always shows: 11 pairs for the rate, 7 for each
+    element, 64 calls in all.
+    """
     needed, first = set("abcdef"), set()
     for seed in range(8):
         made = []
@@ -172,7 +174,9 @@ def test_the_certificate_calls_each_world_once_in_a_block_and_draws_the_order():
 
 @cache
 def stepping_back(salt):
-    """A reduction that drifts: what is found, its rounds, and the environments to which it went back."""
+    """A reduction that drifts: what is found, its rounds, and the environments to which it went
+    back.
+    """
     rounds, options = [], {"skip": "known", "accept_rate": "kept"}
     found = ddenv.reduce(ELEMENTS, drifting(salt), on_round=rounds.append, **options, **ALL)
     steps = zip(found.history, found.history[1:], strict=False)
@@ -184,7 +188,9 @@ def stepping_back(salt):
 
 
 def test_after_a_certificate_the_chosen_algorithm_goes_on_with_the_n_that_it_had():
-    """A round of ddenv begins with a partition; one that leaves out again what had gone has one candidate; a sweep does neither."""
+    """A round of ddenv begins with a partition; one that leaves out again what had gone has one
+    candidate; a sweep does neither.
+    """
     again = 0
     for salt in range(20):
         _, rounds, reached = stepping_back(salt)
@@ -228,7 +234,9 @@ def line_of(count):
 
 
 def test_splitting_looks_once_where_the_failure_is_flaky_and_confirms_the_end():
-    """Within 1.6 times the bits that name the needed models, at what a run tells of them (0.618 bits at a rate of 0.8)."""
+    """Within 1.6 times the bits that name the needed models, at what a run tells of them (0.618
+    bits at a rate of 0.8).
+    """
     needed, tests = {"m30", "m33", "m35"}, []
     for salt in range(30):
         rng, made = np.random.default_rng(salt), []
@@ -296,7 +304,9 @@ def test_what_a_search_does_not_try_again_the_certificate_does(salt):
 @examples(0.5)
 @pytest.mark.filterwarnings("ignore:the failure shows in about")
 def test_a_flaky_test_is_noticed_or_shows_the_same_in_all_replays(salt, rate, algorithm):
-    """With the defaults: one miss, even the first, neither ends the reduction nor makes it minimal."""
+    """With the defaults: one miss, even the first, neither ends the reduction nor makes it
+    minimal.
+    """
     rng, made = np.random.default_rng(salt), []
 
     def test(kept):
@@ -328,7 +338,9 @@ def test_where_one_call_decides_minimal_is_not_said(options):
 
 
 def graded(rng):
-    """Shows in 95 % with all elements; without "a" never, and without each of "b" to "f" 0.9 times as often."""
+    """Shows in 95 % with all elements; without "a" never, and without each of "b" to "f" 0.9 times
+    as often.
+    """
     return lambda kept: "a" in kept and rng.random() < 0.95 * 0.9 ** len(set("bcdef") - kept)
 
 
@@ -536,7 +548,10 @@ def test_whatever_is_raised_comes_through_also_the_end_of_an_iterator(where, err
 
 
 def test_the_library_needs_neither_drake_nor_a_screen():
-    code = "import ddenv; assert ddenv.reduce('abcdef', lambda kept: kept >= {'a', 'e'}, algorithm='ddmin').kept == ('a', 'e')"
+    code = (
+        "import ddenv; assert ddenv.reduce('abcdef', lambda kept: kept >= {'a', 'e'}, "
+        "algorithm='ddmin').kept == ('a', 'e')"
+    )
     assert loaded(code, "pydrake", "textual", "pydantic", "yaml") == []
 
 
@@ -605,7 +620,8 @@ def test_the_guides_package_works_as_printed(tmp_path):
         "traits = {name: ddenv.Traits(size) for name, size in zip('abcd', (1, 9, 2, 3))}\n"
         "positions = {name: (float(x), 0, 0) for x, name in enumerate('abcd')}\n"
         "first = []\n"
-        "ddenv.reduce('abcd', lambda kept: first.append(kept) or 'b' in kept, prioritization='heavy-first',\n"
+        "ddenv.reduce('abcd', lambda kept: first.append(kept) or 'b' in kept, "
+        "prioritization='heavy-first',\n"
         "             positions=positions, traits=traits, check=False, n_partitions=4)\n"
         "print(sorted(first[0]))"
     )

@@ -65,7 +65,8 @@ def test_timeseg_groups_models_by_when_the_robot_was_near():
 
 def test_timeseg_measures_to_the_path_and_not_only_to_its_samples():
     path = np.array([[0.0, 0, 0], [10, 0, 0], [10, 4.2, 0]])
-    # 4 m from the middle of the first stretch, whose ends are 6.4 m away; 5 m from the end of the second.
+    # 4 m from the middle of the first stretch, whose ends are 6.4 m away; 5 m from the end of the
+    # second.
     distance, fraction = to_segments(np.array([[5.0, 4.0, 0.0]]), path)
     assert distance[0] == pytest.approx([4.0, 5.0])
     assert fraction[0, 0] == pytest.approx(0.5)
@@ -102,7 +103,8 @@ def test_trajectoryseg_cuts_where_the_turning_changes():
 def test_changes_up_to_delta_are_no_cuts_and_long_spans_are_halved():
     trajectory = turning(0, 1.0, 1.0, 1.4)
     assert cuts(trajectory, 0.5, 2) == pytest.approx([1.0])
-    # The change of 0.4 at 3 s counts with a smaller delta only; otherwise the longest span, from 1 to 4 s, is halved.
+    # The change of 0.4 at 3 s counts with a smaller delta only; otherwise the longest span, from 1
+    # to 4 s, is halved.
     assert cuts(trajectory, 0.5, 3) == pytest.approx([1.0, 2.5])
     assert cuts(trajectory, 0.3, 3) == pytest.approx([1.0, 3.0])
 

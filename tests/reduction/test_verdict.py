@@ -1,4 +1,6 @@
-"""When a candidate is taken: soon where it is clear, never against what its runs show, whichever of them finish first."""
+"""When a candidate is taken: soon where it is clear, never against what its runs show, whichever of
+them finish first.
+"""
 
 import random
 

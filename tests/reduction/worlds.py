@@ -17,7 +17,9 @@ ALGORITHMS = names("algorithm")
 
 
 def evidence(count, seed, **known):
-    """A world of `count` models and a robot that wandered about, with a trace of all there is to know."""
+    """A world of `count` models and a robot that wandered about, with a trace of all there is to
+    know.
+    """
     rng = np.random.default_rng(seed)
     elements = tuple(f"m{index}" for index in range(count))
     positions = {name: tuple(rng.normal(size=3)) for name in elements}

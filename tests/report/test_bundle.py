@@ -107,7 +107,9 @@ def test_without_this_ddenv_nothing_is_said_of_the_failure(run, tmp_path):
 
 @pytest.mark.examples
 def test_git_bisect_finds_the_change_that_made_the_robot_fail(tmp_path, home):
-    """In a repository with the user's own simulator; the change is seen by the run that failed after it."""
+    """In a repository with the user's own simulator; the change is seen by the run that failed
+    after it.
+    """
     repository, bundle = tmp_path / "repository", tmp_path / "bundle"
     shutil.copytree(EXAMPLE, repository)
     program = repository / "drive.py"

@@ -18,7 +18,8 @@ from ddenv.world.scenario import Scenario
 from ddenv.world.sdf.read import parse_world, read_model, read_world
 
 GROUND = (
-    '<model name="ground"><static>true</static><link name="link"><collision name="c"><geometry><plane>'
+    '<model name="ground"><static>true</static><link name="link"><collision '
+    'name="c"><geometry><plane>'
     "<normal>0 0 1</normal></plane></geometry></collision></link></model>"
 )
 
@@ -34,7 +35,8 @@ def box_model(name: str, pose: str, size: str, mass: float | None = None, mu: fl
             f"<iyy>{mass * (x * x + z * z) / 12}</iyy><izz>{mass * (x * x + y * y) / 12}</izz></inertia></inertial>"
         )
     return (
-        f'<model name="{name}">{static}<pose>{pose}</pose><link name="link">{inertial}<collision name="c"><geometry><box>'
+        f'<model name="{name}">{static}<pose>{pose}</pose><link name="link">{inertial}<collision '
+        'name="c"><geometry><box>'
         f"<size>{size}</size></box></geometry><surface><friction><ode><mu>{mu}</mu></ode></friction></surface></collision>"
         "</link></model>"
     )
@@ -166,7 +168,9 @@ def husky() -> Model:
 
 @pytest.fixture(scope="session")
 def scenario_of() -> Callable[..., Scenario]:
-    """A scenario that starts in the origin of a flat world and drives along x, with changes to its sections."""
+    """A scenario that starts in the origin of a flat world and drives along x, with changes to its
+    sections.
+    """
 
     def make(**sections: dict) -> Scenario:
         data = {
@@ -186,7 +190,10 @@ def world_of() -> Callable[..., World]:
     """The world made of these models in SDF, with a ground unless `ground` is False."""
 
     def make(*models: str, ground: bool = True) -> World:
-        text = f'<sdf version="1.9"><world name="w">{GROUND if ground else ""}{"".join(models)}</world></sdf>'
+        text = (
+            '<sdf version="1.9"><world '
+            f'name="w">{GROUND if ground else ""}{"".join(models)}</world></sdf>'
+        )
         return parse_world(text.encode(), Path("world.sdf"))
 
     return make

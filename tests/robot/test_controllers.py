@@ -184,7 +184,8 @@ def test_its_random_numbers_are_those_of_its_seed(tmp_path):
 
 def test_what_it_prints_goes_to_stderr(tmp_path, capsys):
     (tmp_path / "loud.py").write_text("print('imported')\nclass Loud:\n    def __init__(self, setup): print('made')\n"
-                                      "    def step(self, reading): print('asked'); return 0.0, 0.0\n")  # fmt: skip
+                                      "    def step(self, reading): print('asked'); return 0.0, "
+                                      "0.0\n")  # fmt: skip
     controllers(Controller(use="loud:Loud"), tmp_path)(SETUP).step(READING)
     assert capsys.readouterr() == ("", "imported\nmade\nasked\n")
 
@@ -226,7 +227,8 @@ def test_modules_that_it_imports_later(tmp_path):
     (tmp_path / "later_helper.py").write_text("TURN = 3.0")
     body = (
         "def __init__(self, setup):\n    from late_helper import SPEED\n    self.speed = SPEED\n"
-        "def step(self, reading):\n    import later_helper\n    return self.speed, later_helper.TURN"
+        "def step(self, reading):\n    import later_helper\n    return self.speed, "
+        "later_helper.TURN"
     )
     assert own(tmp_path, body).step(READING) == Twist(2.0, 3.0)
     assert sys.path == path
@@ -258,7 +260,10 @@ def test_a_module_that_is_installed(tmp_path):
         ("leaving:Drive", r"importing 'leaving' raised SystemExit: 0 \(leaving.py:1\)"),
         (
             "needing:Drive",
-            r"importing 'needing' raised ModuleNotFoundError: No module named 'nowhere' \(needing.py:1\)",
+            (
+                r"importing 'needing' raised ModuleNotFoundError: No module named 'nowhere' "
+                r"\(needing.py:1\)"
+            ),
         ),
         ("json:Drive", "'json' in .* has the name of another module; rename it"),
     ],

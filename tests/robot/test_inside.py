@@ -9,14 +9,16 @@ from ddenv.runs.subject import load_parts, scenario_for_world, with_options
 from ddenv.world.scenario import Reading
 
 GROUND = (
-    "<model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane><normal>0 0 1</normal>"
+    "<model name='ground'><static>true</static><link name='l'><collision "
+    "name='c'><geometry><plane><normal>0 0 1</normal>"
     "<size>50 50</size></plane></geometry></collision></link></model>"
 )
 
 
 def box(name, x, y):
     return (
-        f"<collision name='{name}'><pose>{x} {y} 0.4 0 0 0</pose><geometry><box><size>0.4 0.3 0.8</size></box></geometry>"
+        f"<collision name='{name}'><pose>{x} {y} 0.4 0 0 0</pose><geometry><box><size>0.4 0.3 "
+        "0.8</size></box></geometry>"
         "</collision>"
     )
 
@@ -26,7 +28,10 @@ def opened(tmp_path_factory):
     """A yard of one model, opened: posts in the robot's way, and a row of others behind it."""
     posts = box("left", 1.5, 0.45) + box("right", 1.5, -0.45)
     row = "".join(box(f"far_{number}", -6 - number, 4) for number in range(6))
-    yard = f"<model name='yard'><static>true</static><link name='posts'>{posts}</link><link name='row'>{row}</link></model>"
+    yard = (
+        f"<model name='yard'><static>true</static><link name='posts'>{posts}</link><link "
+        f"name='row'>{row}</link></model>"
+    )
     path = tmp_path_factory.mktemp("yard") / "yard.sdf"
     path.write_text(f"<sdf version='1.9'><world name='w'>{GROUND}{yard}</world></sdf>")
     scenario = with_options(scenario_for_world(path, (0, 0, 0.15, 0), (6, 0)), timeout=5.0)

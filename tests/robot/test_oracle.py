@@ -159,7 +159,9 @@ def leaning(degrees: float, first: float, last: float = math.inf):
 
 
 def falling(deep: float, start: float, end: float | None = None) -> np.ndarray:
-    """Falls freely from `start` s on until it lies `deep` m lower; at the end it is at the height `end`."""
+    """Falls freely from `start` s on until it lies `deep` m lower; at the end it is at the height
+    `end`.
+    """
     rows = way(20, lambda t: (t, 0, 2 - min(deep, 4.9 * max(0.0, t - start) ** 2)))
     rows[-1, 3] = rows[-1, 3] if end is None else end
     return rows

@@ -1,4 +1,6 @@
-"""The three scenarios: they fail for few models' sake, and nothing depends on how a world was made smaller."""
+"""The three scenarios: they fail for few models' sake, and nothing depends on how a world was made
+smaller.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,9 @@ REPAIRED_SEEDS = 3
 
 
 def of_each(*quick: str) -> pytest.MarkDecorator:
-    """All three, of which the `quick` ones are in the quick tier. One process builds a world once for all tests of it."""
+    """All three, of which the `quick` ones are in the quick tier. One process builds a world once
+    for all tests of it.
+    """
 
     def marks(name: str) -> list[pytest.MarkDecorator]:
         return [pytest.mark.xdist_group(name)] + [pytest.mark.rates] * (name not in quick)

@@ -1,4 +1,6 @@
-"""Events come back from a file as they were written; what is missing, unknown or out of range in one is named in one line."""
+"""Events come back from a file as they were written; what is missing, unknown or out of range in
+one is named in one line.
+"""
 
 import json
 from dataclasses import MISSING, fields

@@ -1,4 +1,6 @@
-"""Events to state: what is told of tests and candidates is right, and no state is ever changed by a later event."""
+"""Events to state: what is told of tests and candidates is right, and no state is ever changed by a
+later event.
+"""
 
 import json
 import tracemalloc

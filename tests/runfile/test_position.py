@@ -1,4 +1,6 @@
-"""A position shows at each event what was known then, however it came there, and steps from one thing to the next."""
+"""A position shows at each event what was known then, however it came there, and steps from one
+thing to the next.
+"""
 
 from unittest.mock import patch
 
@@ -16,7 +18,9 @@ ELEMENTS = [f"box {number}" for number in range(8)]
 
 
 def happened(rounds: list[list[int]]) -> list[Recorded]:
-    """A run whose rounds halve the environment: for each round the numbers of tests of its candidates; the last one wins."""
+    """A run whose rounds halve the environment: for each round the numbers of tests of its
+    candidates; the last one wins.
+    """
     found = [("created", {"scenario": {}, "elements": ELEMENTS})]
     found.append(("engine_started", {"pid": 1, "jobs": 1, "version": "0", "simulator": "none"}))
     test, kept = 0, list(range(len(ELEMENTS)))

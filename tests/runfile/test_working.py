@@ -1,4 +1,6 @@
-"""The time that a run took is that in which an engine worked: pauses and waiting for the user do not count."""
+"""The time that a run took is that in which an engine worked: pauses and waiting for the user do
+not count.
+"""
 
 from dataclasses import replace
 

@@ -1,4 +1,6 @@
-"""Runs of Drake's model directives: what is welded stays or goes together, and what is left is a file of directives again."""
+"""Runs of Drake's model directives: what is welded stays or goes together, and what is left is a
+file of directives again.
+"""
 
 import shutil
 

@@ -25,7 +25,8 @@ TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 
 
 def box(name, x):
     return (
-        f"<model name='{name}'><static>1</static><pose>{x} 5 0 0 0 0</pose><link name='l'><collision name='c'>"
+        f"<model name='{name}'><static>1</static><pose>{x} 5 0 0 0 0</pose><link "
+        "name='l'><collision name='c'>"
         f"<geometry><box><size>1 1 1</size></box></geometry></collision></link></model>"
     )
 

@@ -18,8 +18,10 @@ def test_it_says_what_goes_and_what_fresh_runs_show_with_and_without_it(run):
     assert found.gone == removed_in_passing(state, run.path) == ("crate_00",)
     assert found.shown
     assert found.words == (
-        "a nearest world that passes lacks 1 model of 11 (crate_00): without it the robot reaches its goal in 20 of 20 fresh "
-        "runs (84 % to 100 %), tested above 45 %; with it put back in 0 of 9 fresh runs (0 % to 30 %)"
+        "a nearest world that passes lacks 1 model of 11 (crate_00): without it the robot "
+        "reaches its goal in 20 of 20 fresh "
+        "runs (84 % to 100 %), tested above 45 %; with it put back in 0 of 9 fresh runs (0 % to "
+        "30 %)"
     )
     # The reduction is as it was.
     assert (state.status, state.minimal, state.certified) == ("finished", True, True)
@@ -56,7 +58,9 @@ def test_before_it_has_ended_nothing_is_claimed(run):
 
 
 def ended(run, claims, removal):
-    """What is said of an isolation that ends with these claims about the world without the first three models."""
+    """What is said of an isolation that ends with these claims about the world without the first
+    three models.
+    """
     fake_moments.finished(run).start_isolation(2)
     gone = run.remove("crate_00", "crate_01", "crate_02")
     run.isolate_all(gone, "e")

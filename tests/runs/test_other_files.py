@@ -19,18 +19,22 @@ from ddenv.world.model import Cylinder, Mesh
 from tests.runs.test_export import TETRAHEDRON
 
 GROUND = (
-    "<model name='ground'><static>1</static><link name='l'><collision name='c'><geometry><plane/></geometry></collision>"
+    "<model name='ground'><static>1</static><link name='l'><collision "
+    "name='c'><geometry><plane/></geometry></collision>"
     "</link></model>"
 )
 ROCK = (
-    "<sdf version='1.7'><model name='rock'><static>1</static><link name='l'><collision name='c'><geometry><mesh>"
+    "<sdf version='1.7'><model name='rock'><static>1</static><link name='l'><collision "
+    "name='c'><geometry><mesh>"
     "<uri>model://rock/rock.obj</uri></mesh></geometry></collision></link></model></sdf>"
 )
 
 
 @pytest.fixture
 def world(tmp_path):
-    """A world with an included rock, whose shape is in a third file, and a barrel that is nowhere."""
+    """A world with an included rock, whose shape is in a third file, and a barrel that is
+    nowhere.
+    """
     folder = tmp_path / "models" / "rock"
     folder.mkdir(parents=True)
     (folder / "rock.obj").write_text(TETRAHEDRON)
@@ -132,7 +136,10 @@ def test_a_wrong_stand_in_in_a_scenario_is_told_with_its_uri(world, tmp_path):
 
 def test_a_guess_is_left_out_where_the_robot_starts(tmp_path):
     def include(name, x):
-        return f"<include><uri>model://{name}</uri><name>{name}</name><pose>{x} 0 0 0 0 0</pose></include>"
+        return (
+            f"<include><uri>model://{name}</uri><name>{name}</name><pose>{x} 0 0 0 0 "
+            "0</pose></include>"
+        )
 
     path, said = tmp_path / "world.sdf", []
     models = include("hall", 0) + include("crate", 4) + include("wagon", 0.3)

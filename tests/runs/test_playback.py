@@ -1,4 +1,6 @@
-"""A finished test is played back from the run file alone; what the file lacks of it is said, and the rest is there."""
+"""A finished test is played back from the run file alone; what the file lacks of it is said, and
+the rest is there.
+"""
 
 import math
 import sqlite3
@@ -82,7 +84,10 @@ def test_a_run_without_trajectories_says_so(finished):
     one = played(finished.file, at_end(finished), 38)
     assert one.length == 0.0
     assert one.lacks == (
-        "The run file has no path of the robot in test 38 (bundles leave paths out): nothing moves here.",
+        (
+            "The run file has no path of the robot in test 38 (bundles leave paths out): nothing "
+            "moves here."
+        ),
     )
 
 

@@ -1,4 +1,6 @@
-"""How many cores and how much memory a process may use: its affinity, and the limits of its control groups."""
+"""How many cores and how much memory a process may use: its affinity, and the limits of its control
+groups.
+"""
 
 import math
 import os
@@ -12,7 +14,9 @@ VERSION_1 = "4:cpu,cpuacct:/docker/a\n3:memory:/docker/a"
 
 @pytest.fixture
 def usable(tmp_path, monkeypatch):
-    """A function from the process's control group and the files of limits to the cores it may use, on a machine with 64."""
+    """A function from the process's control group and the files of limits to the cores it may use,
+    on a machine with 64.
+    """
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(64)), raising=False)
     monkeypatch.setattr(processor, "ROOT", tmp_path)
 

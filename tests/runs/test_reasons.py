@@ -1,4 +1,6 @@
-"""Why what is left makes the robot fail: every sentence says what the certificate's runs show, and where two of them part."""
+"""Why what is left makes the robot fail: every sentence says what the certificate's runs show, and
+where two of them part.
+"""
 
 from array import array
 from dataclasses import replace
@@ -118,7 +120,8 @@ def test_it_says_when_the_robot_met_the_model_and_nothing_where_no_pair_shows_it
         touched=True,
     )
     assert parting_sentence(replace(one, parting=met)) == (
-        "With seed 7 the two runs differ after 1.2 s, and are 0.1 m apart after 2.0 s, at (0.00, 3.00) m. "
+        "With seed 7 the two runs differ after 1.2 s, and are 0.1 m apart after 2.0 s, at (0.00, "
+        "3.00) m. "
         "With it there, the robot touches it after 1.1 s."
     )
     assert parting_sentence(replace(one, parting=None)) == ""
@@ -137,11 +140,14 @@ def test_of_an_unfinished_certificate_it_says_what_is_shown_so_far(run):
     run.start_certificate()
     run.certify_all(2, None, 12 * "s")
     run.certify_all(2, "crate_00", 8 * "p")
-    # Nine tenths of the certificate's error are for claims in turn. The whole world runs only where what is left misses f.
+    # Nine tenths of the certificate's error are for claims in turn. The whole world runs only where
+    # what is left misses f.
     kept, often = min(2 / 3, Pairs(both=12).keeps_at_least(0.027)), Pairs(second=8).at_most(0.027)
     with pytest.raises(UserError) as refused:
         reasons(run.file, run.state)
     assert str(refused.value) == (
-        f"{run.path}: its certificate is not finished; so far at least {percent_at_least(kept)} of the whole world's rate is kept; "
-        f"without crate_00 f shows at most {percent_at_most(often)} as often; make a certificate first: ddenv resume {run.path}"
+        f"{run.path}: its certificate is not finished; so far at least {percent_at_least(kept)} "
+        "of the whole world's rate is kept; "
+        f"without crate_00 f shows at most {percent_at_most(often)} as often; make a certificate "
+        f"first: ddenv resume {run.path}"
     )

@@ -1,4 +1,6 @@
-"""How many tests are left of a run, by the engine's forecast, and how many a reduction takes roughly."""
+"""How many tests are left of a run, by the engine's forecast, and how many a reduction takes
+roughly.
+"""
 
 from random import Random
 from statistics import median
@@ -23,7 +25,8 @@ from tests.conftest import DATA
 from tests.tiers import slow
 from tests.workbench import fake_moments
 
-# Mean tests of random worlds (docs/benchmarks.md): models, with a failure that always shows, and with one in 80 % of the runs.
+# Mean tests of random worlds (docs/benchmarks.md): models, with a failure that always shows, and
+# with one in 80 % of the runs.
 MEASURED = (
     ("ddenv", False, ((43, 15.9, 44), (25, 35.0, 120), (200, 54.9, 170))),
     ("ddenv", True, ((43, 36.9, 120), (36, 67.9, 242), (200, 238.5, 858))),
@@ -54,7 +57,9 @@ def test_a_rough_interval_holds_what_random_worlds_took(algorithm, as_printed, c
 
 
 def certified(rate, certify_rate, left, at_least, random):
-    """The tests of a certificate of so many needed models that keep the whole world's rate, as the engine makes it."""
+    """The tests of a certificate of so many needed models that keep the whole world's rate, as the
+    engine makes it.
+    """
     whole, end = "whole", "end"
     rates, shown = {whole: rate, end: rate}, {}
 
@@ -219,7 +224,9 @@ def test_each_forecast_narrows_the_one_before_unless_they_contradict_each_other(
 
 @pytest.mark.parametrize(("left", "without"), [(1.0, 0.5), (0.9, 0.7), (0.4, 0.0)])
 def test_once_removals_have_shown_something_the_rest_is_forecast_from_that(left, without):
-    """Where a removal only lowers the rate, it takes many more pairs than one after which f never shows."""
+    """Where a removal only lowers the rate, it takes many more pairs than one after which f never
+    shows.
+    """
     rest, whole = Environment.whole(1), Environment.whole(2)
     took, low, high = [], [], []
     for salt in range(30):

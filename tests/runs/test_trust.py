@@ -30,7 +30,9 @@ BRINGS = {
 
 @pytest.fixture
 def scenario(home):
-    """Writes a scenario in a folder of the user's own; whatever of it starts leaves `home/started`."""
+    """Writes a scenario in a folder of the user's own; whatever of it starts leaves
+    `home/started`.
+    """
     folder = home / "own"
     folder.mkdir()
     (folder / "sim.sh").write_text(f"#!/bin/sh\ntouch {home / 'started'}\nexit 1\n")

@@ -1,4 +1,6 @@
-"""Run files for the scene's tests: a small world, and the events of a reduction up to a stage of it."""
+"""Run files for the scene's tests: a small world, and the events of a reduction up to a stage of
+it.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,8 @@ def _box(name: str, pose: str, size: str, static: bool) -> str:
     shape = f"<geometry><box><size>{size}</size></box></geometry>"
     escaped = name.replace("<", "&lt;").replace(">", "&gt;")
     return (
-        f'<model name="{escaped}"><static>{str(static).lower()}</static><pose>{pose}</pose><link name="link">'
+        f'<model name="{escaped}"><static>{str(static).lower()}</static><pose>{pose}</pose><link '
+        'name="link">'
         f'<collision name="c">{shape}</collision></link></model>'
     )
 

@@ -1,4 +1,6 @@
-"""The page in a real browser: a headless Chromium, spoken to through its DevTools protocol, draws it with software GL."""
+"""The page in a real browser: a headless Chromium, spoken to through its DevTools protocol, draws
+it with software GL.
+"""
 
 from __future__ import annotations
 
@@ -111,7 +113,10 @@ class Page:
 
     async def heed(self) -> None:
         """From now on notes what a page's policy forbids; `forbidden` tells."""
-        note = "document.addEventListener('securitypolicyviolation', (event) => forbidden.push(event.violatedDirective + ' '"
+        note = (
+            "document.addEventListener('securitypolicyviolation', (event) => "
+            "forbidden.push(event.violatedDirective + ' '"
+        )
         source = f"window.forbidden = []; {note} + event.blockedURI))"
         await self.do("Page.enable")
         await self.do("Page.addScriptToEvaluateOnNewDocument", source=source)
@@ -161,7 +166,10 @@ async def test_the_picture_shows_robot_goal_and_failure(reduced, start_scene):
         page = await Page.open(port)
         await page.heed()
         await page.do("Page.navigate", url=url)
-        ready = "typeof viewer !== 'undefined' && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 5"
+        ready = (
+            "typeof viewer !== 'undefined' && viewer.num_messages_received > 30 && "
+            "viewer.renderer.info.render.calls > 5"
+        )
         await shows(page, ready)
         await shows(page, "document.title === 'small · ddenv'")
         await shows(
@@ -185,7 +193,8 @@ async def test_the_picture_shows_robot_goal_and_failure(reduced, start_scene):
             pictures.append(await page.picture())
             return near(pictures[-1], ROBOT_YELLOW) > 100
 
-        # The browser shows a frame some time after it was drawn: until then, and now and again later, the canvas is white.
+        # The browser shows a frame some time after it was drawn: until then, and now and again
+        # later, the canvas is white.
         await eventually(is_drawn, lambda: "no robot's yellow")
         picture = pictures[-1]
         process.terminate()
@@ -195,7 +204,10 @@ async def test_the_picture_shows_robot_goal_and_failure(reduced, start_scene):
         assert start_scene(reduced.path).stdout.readline().strip() == url
         await shows(
             page,
-            "document.getElementById('lost').style.display !== 'block' && typeof play !== 'undefined' && play !== null",
+            (
+                "document.getElementById('lost').style.display !== 'block' && typeof play !== "
+                "'undefined' && play !== null"
+            ),
         )
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 200
     assert near(picture, ROBOT_YELLOW) > 100
@@ -219,7 +231,10 @@ async def test_a_finished_test_is_played_with_a_slider_steps_and_a_ghost(reduced
         await shows(page, place_of("'robot'") + " > 0.1")
         await page.value("document.getElementById('toggle').click()")
         assert await page.value("going") is False
-        slide = "(at) => { const one = document.getElementById('time'); one.value = at; one.dispatchEvent(new Event('input')); }"
+        slide = (
+            "(at) => { const one = document.getElementById('time'); one.value = at; "
+            "one.dispatchEvent(new Event('input')); }"
+        )
         await page.value(f"({slide})(4)")
         assert await page.value(place_of("'robot'")) == pytest.approx(1.55, abs=0.01)
         assert await page.value(place_of("'models', '003 board'")) == pytest.approx(
@@ -268,7 +283,10 @@ async def test_a_finished_test_is_played_with_a_slider_steps_and_a_ghost(reduced
         )
         assert await page.value("forbidden") == []
         unnamed = "[...document.querySelectorAll('#play button, #play input, #play select')]"
-        unnamed += ".filter((one) => !one.textContent.trim() && !one.getAttribute('aria-label') && !one.labels?.length).length"
+        unnamed += (
+            ".filter((one) => !one.textContent.trim() && !one.getAttribute('aria-label') && "
+            "!one.labels?.length).length"
+        )
         assert await page.value(unnamed) == 0
 
 

@@ -172,7 +172,9 @@ def test_a_finished_test_is_played_by_the_browser(writer, screen, player):
 
 
 def test_a_run_with_a_moved_model_is_the_ghost_of_one_without(writer, screen, player):
-    """The model stands where it was, and as a ghost where it is in that run; of a friction there is no such ghost."""
+    """The model stands where it was, and as a ghost where it is in that run; of a friction there is
+    no such ghost.
+    """
     writer.round()
     writer.reduce()
     number = {"now": 1.5, "low": -1.5, "high": 4.5, "scale": 3.0, "resolution": 0.01, "unit": "m"}

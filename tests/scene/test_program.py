@@ -211,7 +211,8 @@ async def test_a_running_test_is_followed(in_round, start_scene):
         assert matrix_of(found, "/world/models/003 board")[:3, 3] == pytest.approx([0.5, 0.0, 0.0])
         wheel = matrix_of(found, "/world/robot/wheel 0")
         assert math.atan2(wheel[0, 2], wheel[0, 0]) == pytest.approx(0.3 / 0.1651)
-    # The engine is gone without an event, and leaves its rows behind: the scene goes back to the failure.
+    # The engine is gone without an event, and leaves its rows behind: the scene goes back to the
+    # failure.
     await messages(url, titled("the failure f"))
     found = await messages(url_of(start_scene(in_round.path)), titled("the failure f"))
     assert not any("runs now" in words["title"] for words in captions(found))
@@ -274,7 +275,8 @@ async def test_browsers_come_and_go_and_it_ends_cleanly(writer, start_scene, num
 def test_ends_with_its_parent(writer):
     code = (
         "import subprocess, sys\n"
-        f"child = subprocess.Popen([sys.executable, '-m', 'ddenv.scene', {str(writer.path)!r}], stdout=subprocess.PIPE)\n"
+        f"child = subprocess.Popen([sys.executable, '-m', 'ddenv.scene', {str(writer.path)!r}], "
+        "stdout=subprocess.PIPE)\n"
         "print(child.pid, child.stdout.readline().decode(), flush=True)"
     )
     parent = subprocess.run(

@@ -20,7 +20,8 @@ from tests.workbench import fake_run
 # As long as a scenario's name may be: 80 letters of four bytes each.
 LONGEST = "\U00010400" * 80
 TWO_PAIRS = "model2model/failure-proximal,model2model/sequential"
-# Of eleven crates, and how it came to that: the baseline's four, one that shows f, and four for each vain candidate.
+# Of eleven crates, and how it came to that: the baseline's four, one that shows f, and four for
+# each vain candidate.
 LEFT = ("crate_00", "crate_01")
 TESTS = 4 + 1 + 2 * 4
 # Of its certificate: two runs of the whole world, five of what is left, four without each model.
@@ -66,7 +67,8 @@ def begun(folder: Path, cell: Cell, world: bytes | None = None) -> fake_run.Fake
     return fake_run.FakeRun(run_path(folder, cell), data, world or cell.scenario.world.read_bytes())
 
 
-# The claims of a certificate: of what is left, and without each model, with its verdict and its runs in letters.
+# The claims of a certificate: of what is left, and without each model, with its verdict and its
+# runs in letters.
 Claims = dict[str | None, tuple[str, str]]
 
 
@@ -100,8 +102,8 @@ def reduced(
     world: bytes | None = None,
     claims: Claims | None = None,
 ) -> Result:
-    """A cell that came to `left`, with so many `vain` candidates of four tests each at the end, as it is read. Its certificate
-    holds, or has these `claims`.
+    """A cell that came to `left`, with so many `vain` candidates of four tests each at the end, as
+    it is read. Its certificate holds, or has these `claims`.
     """
     run = begun(folder, cell, world)
     run.created().baseline()

@@ -1,4 +1,6 @@
-"""Engines in threads of this process, on a simulator that costs nothing: what a study starts as programs."""
+"""Engines in threads of this process, on a simulator that costs nothing: what a study starts as
+programs.
+"""
 
 from __future__ import annotations
 
@@ -64,10 +66,11 @@ class Engine:
 
 
 class Lab:
-    """Stands for all programs of a study. `oracle(scenario's name, models, seed)` says how a test ends.
+    """Stands for all programs of a study. `oracle(scenario's name, models, seed)` says how a test
+    ends.
 
-    `before(run, made)` is called in the engine's thread before a test of `run` ends, with how many it has made since it was
-    started.
+    `before(run, made)` is called in the engine's thread before a test of `run` ends, with how many
+    it has made since it was started.
     """
 
     def __init__(self, monkeypatch, oracle: Oracle) -> None:

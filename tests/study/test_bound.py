@@ -20,9 +20,11 @@ def subsets(models, sizes):
 
 
 def optimum(models, needed, iterations, sizes):
-    """Tests that the best strategy takes in the worst case to tell which `needed` models of `models` it is that f needs.
+    """Tests that the best strategy takes in the worst case to tell which `needed` models of
+    `models` it is that f needs.
 
-    It knows beforehand that f needs so many of them as one of `sizes` says, and that it shows wherever all of those are.
+    It knows beforehand that f needs so many of them as one of `sizes` says, and that it shows
+    wherever all of those are.
     """
 
     @cache

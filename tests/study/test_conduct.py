@@ -1,4 +1,6 @@
-"""A study makes its cells whatever happens to it: interrupted, killed, beside broken ones, and once."""
+"""A study makes its cells whatever happens to it: interrupted, killed, beside broken ones, and
+once.
+"""
 
 import csv
 import html
@@ -123,7 +125,9 @@ def test_run_again_it_makes_only_what_is_missing(undisturbed, two_by_two, lab, t
 
 
 def test_a_certificate_that_broke_is_made_again(lab, tmp_path):
-    """Too many of its runs without the wall break: its claim is unknown, until the same command makes them again."""
+    """Too many of its runs without the wall break: its claim is unknown, until the same command
+    makes them again.
+    """
     plan, folder = plan_of(wall(tmp_path), **ONE), tmp_path / "study"
     lab.oracle = lambda name, keep, seed: (
         "error" if seed >= FIRST_FRESH_RUN and "wall" not in keep else fails(name, keep, seed)
@@ -176,7 +180,9 @@ def test_terminated_it_writes_what_it_has_and_goes_on(
 
 
 def test_cells_that_come_to_no_end_are_told_and_the_others_are_made(tmp_path, lab):
-    """In one the robot reaches its goal, in one the simulator goes out of order, in one the engine is killed."""
+    """In one the robot reaches its goal, in one the simulator goes out of order, in one the engine
+    is killed.
+    """
     names = ("never", "breaks", "killed", "fails")
     files = [wall(tmp_path, name, seed=number, iterations=30) for number, name in enumerate(names)]
     plan = plan_of(*files, **ONE)
@@ -252,7 +258,9 @@ def test_an_engine_that_a_killed_study_left_is_waited_for(alone, lab, monkeypatc
 
 
 def test_an_engine_that_was_left_and_begins_only_now_is_waited_for(alone, lab, monkeypatch):
-    """It was started just before the study was killed: it has the run before the new one's engine has."""
+    """It was started just before the study was killed: it has the run before the new one's engine
+    has.
+    """
     gate = threading.Event()
     start = lab.start_engine
 

@@ -1,4 +1,6 @@
-"""What is written of a study: a page, Markdown with figures, and a table, of whatever its cells came to and are called."""
+"""What is written of a study: a page, Markdown with figures, and a table, of whatever its cells
+came to and are called.
+"""
 
 import csv
 import io
@@ -42,7 +44,9 @@ def written(plan, folder, sessions=SESSIONS):
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """Two methods with three seeds each: the second one never failed, is not shown to be minimal, and is not made."""
+    """Two methods with three seeds each: the second one never failed, is not shown to be minimal,
+    and is not made.
+    """
     folder = tmp_path_factory.mktemp("study")
     plan = plan_of(crates(folder), seeds=3)
     one, two, three, never, chance, _ = plan.cells
@@ -59,10 +63,14 @@ def study(tmp_path_factory):
 
 def test_several_seeds_are_told_as_median_and_range(study):
     page, text, *_ = study
-    row = "3 of 3 | 13 (9 to 17) | 15 (11 to 15) | 82 % (82 % to 91 %) | 0.4 (0.3 to 0.6) | 0.5 (0.4 to 0.5)"
+    row = (
+        "3 of 3 | 13 (9 to 17) | 15 (11 to 15) | 82 % (82 % to 91 %) | 0.4 (0.3 to 0.6) | 0.5 "
+        "(0.4 to 0.5)"
+    )
     assert f"| model2model/failure-proximal | {row} |" in text
     assert row.replace(" |", "") in page.text
-    # Behind it: re-runs, what is left, f in the whole world, in what is left and without a model, steps back, and the bound.
+    # Behind it: re-runs, what is left, f in the whole world, in what is left and without a model,
+    # steps back, and the bound.
     left = "`crate_00`, `crate_01` (2 of 3); `crate_03` (1 of 3)"
     rates = "9 of 12 (33 % to 97 %) | 15 of 15 (72 % to 100 %) | at most 0 of 4 (0 % to 66 %)"
     assert (
@@ -74,7 +82,10 @@ def test_several_seeds_are_told_as_median_and_range(study):
 def test_what_went_wrong_is_told_with_its_seed(study):
     page, text, rows, *_ = study
     assert "3 cells not certified: the tables say why." in page.text
-    doubt = "not shown that each model is needed: undecided without crate_07; with everything that is left f in 5 of 5 fresh runs"
+    doubt = (
+        "not shown that each model is needed: undecided without crate_07; with everything that "
+        "is left f in 5 of 5 fresh runs"
+    )
     for words in (
         "Not certified: model2model/sequential, seed 0: there is no failure to reduce.",
         f"Not certified: model2model/sequential, seed 100000: {doubt} (41 % to 100 %).",
@@ -159,7 +170,10 @@ def test_each_minimal_world_is_drawn_once_those_found_most_first(study):
     second = page.text.index(
         "The minimal world (the paper's Figure 3), the end of 1 of 4 cells: crate_03."
     )
-    unsure = "What is left, not shown to be minimal (the paper's Figure 3), the end of 1 of 4 cells: crate_03, crate_07."
+    unsure = (
+        "What is left, not shown to be minimal (the paper's Figure 3), the end of 1 of 4 cells: "
+        "crate_03, crate_07."
+    )
     assert page.text.index(first) < second < page.text.index(unsure)
 
 

@@ -134,7 +134,11 @@ WRONG = (
     ),
     (
         {"pairs": "paper,timeseg/failur-proximal"},
-        r"--pairs: no prioritization 'failur-proximal' \(did you mean failure-proximal\?\).*; or give 'paper' or 'all'",
+        (
+            r"--pairs: no prioritization 'failur-proximal' \(did you mean "
+            r"failure-proximal\?\).*; or "
+            r"give 'paper' or 'all'"
+        ),
     ),
     (
         {"algorithms": "ddmni"},

@@ -1,4 +1,6 @@
-"""`ddenv study` as it is typed, on a simulator of a few lines: killed, interrupted, and at its end the same as undisturbed."""
+"""`ddenv study` as it is typed, on a simulator of a few lines: killed, interrupted, and at its end
+the same as undisturbed.
+"""
 
 import csv
 import os
@@ -102,7 +104,8 @@ def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, m
     assert "1 of 1 cell certified; wrote study/study.html" in said
     assert len(sessions(folder)) == 3
 
-    # Of the tests that were in flight nothing is left, and no other one was made twice, but for replays of runs that showed f.
+    # Of the tests that were in flight nothing is left, and no other one was made twice, but for
+    # replays of runs that showed f.
     (row,) = csv.DictReader((folder / "study.csv").read_text().splitlines())
     replays = sum(event.kind == "comparing" for event in events(run))
     in_flight = len(made.read_text()) - int(row["tests"]) - int(row["certificate_tests"]) - replays

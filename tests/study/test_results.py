@@ -47,7 +47,8 @@ def test_a_minimal_cell(done):
     result = read_cell(*done)
     assert (result.minimal, result.problem, result.left) == (True, "", LEFT)
     assert len(result.elements) == 11 and result.smaller == 1 - 2 / 11
-    # The baseline, a reduction of one test, and two vain candidates with three re-runs each; every test took 2 s.
+    # The baseline, a reduction of one test, and two vain candidates with three re-runs each; every
+    # test took 2 s.
     assert (result.tests, result.reruns, result.seconds, result.misses) == (
         TESTS,
         6,
@@ -68,7 +69,9 @@ def test_a_minimal_cell(done):
 
 
 def test_tests_made_ahead_of_time_do_not_count(tmp_path, cell, run):
-    """The first candidate shows f while re-runs and the second one are on already: one worker would have made one test."""
+    """The first candidate shows f while re-runs and the second one are on already: one worker would
+    have made one test.
+    """
     run.created().baseline()
     run.start_round(3)
     first, second, rerun, third = run.start(0), run.start(1), run.start(0, 1), run.start(2)
@@ -115,11 +118,18 @@ def test_steps_back_are_counted_with_all_their_tests(tmp_path, cell, run):
     [
         (
             {None: ("lost", "ssppppppppppp")},
-            "what is left keeps less than 80 % of the whole world's rate: f in 2 of 13 fresh runs (1 % to 56 %)",
+            (
+                "what is left keeps less than 80 % of the whole world's rate: f in 2 of 13 fresh "
+                "runs (1 % to 56 %)"
+            ),
         ),
         (
             {None: ("not shown", "sssp")},
-            "not shown that what is left keeps 66 % of the whole world's rate; it keeps at least 9 %: f in 3 of 4",
+            (
+                "not shown that what is left keeps 66 % of the whole world's rate; it keeps at "
+                "least "
+                "9 %: f in 3 of 4"
+            ),
         ),
         (holds(LEFT) | {"crate_01": ("not shown", "sppp")}, "undecided without crate_01"),
         (holds(LEFT) | {"crate_01": ("unknown", "eppp")}, "tests broke without crate_01"),

@@ -1,4 +1,6 @@
-"""The tables of a study from its results: the paper's numbers, medians and ranges, and which method is best where."""
+"""The tables of a study from its results: the paper's numbers, medians and ranges, and which method
+is best where.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +24,9 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def certificate(left, *verdicts):
-    """A certificate of the models `left`: with other `verdicts` for some claims, first for what is left."""
+    """A certificate of the models `left`: with other `verdicts` for some claims, first for what is
+    left.
+    """
     names = (None, *MODELS[:left])
     verdicts = (*verdicts, *("kept", *["needed"] * left)[len(verdicts) :])
     claims = [
@@ -50,7 +54,9 @@ def certificate(left, *verdicts):
 
 
 def result_of(cell, tests, left=1, **other):
-    """A minimal cell of 16 models, half of whose tests are re-runs, of 3 s each; 40 more of its certificate."""
+    """A minimal cell of 16 models, half of whose tests are re-runs, of 3 s each; 40 more of its
+    certificate.
+    """
     baseline = BaselineFinished(
         runs=10,
         failures=9,
@@ -87,8 +93,8 @@ def result_of(cell, tests, left=1, **other):
 
 
 def cells(tmp_path, *tests, pairs=FIVE, seeds=1):
-    """The rows of two scenarios; `tests` are those of each cell in the order of the tables: None where there is no end, below
-    zero where the certificate fails.
+    """The rows of two scenarios; `tests` are those of each cell in the order of the tables: None
+    where there is no end, below zero where the certificate fails.
     """
     plan = plan_of(crates(tmp_path, "one"), crates(tmp_path, "two"), pairs=pairs, seeds=seeds)
     made = [
@@ -183,9 +189,9 @@ def test_the_claim_counts_what_is_better_than_the_paper():
     report = content(plan, made, (), Path("nowhere"))
     told = " ".join(part for each in report.lead for part in each.parts)
     assert (
-        "the same 3 cells of the paper: at least as much removed in 2, no more tests in 2. They took 17 hours"
-        in told
-    )
+        "the same 3 cells of the paper: at least as much removed in 2, no more tests in 2. They "
+        "took 17 hours"
+    ) in told
     assert report.verdict == "Every world is minimal: 88 % smaller on average"
 
 
@@ -222,7 +228,9 @@ def test_half_a_success_is_none(tmp_path, second):
 
 
 def test_which_is_best_where(tmp_path):
-    """In the first scenario the last method needs the fewest tests, on the whole the second one does."""
+    """In the first scenario the last method needs the fewest tests, on the whole the second one
+    does.
+    """
     _, _, both = cells(tmp_path, 40, 20, 30, 90, 19, *(40, 20, 30, 90, 80))
     rows, bound = ranking(both)
     # The baseline's four, f once, and the model left out without success.
@@ -252,7 +260,8 @@ def test_the_figure_has_a_line_for_each_method(tmp_path):
     assert [path.find(f"{SVG}title").text for path in lines] == [
         f"{cell.label}, seed 0" for cell in plan.cells[:4]
     ]
-    # From the end of the baseline on, at the top, down to one model; each size holds until the next one.
+    # From the end of the baseline on, at the top, down to one model; each size holds until the next
+    # one.
     places = [
         [tuple(map(float, at.split())) for at in path.get("d")[1:].split("L")] for path in lines
     ]

@@ -9,7 +9,9 @@ from tests.shorthand import typed
 
 
 def states(*happened: tuple[str, dict], scenario: dict | None = None) -> list[RunState]:
-    """The states of a run of four boxes after its round of two partitions started, and after each of these events."""
+    """The states of a run of four boxes after its round of two partitions started, and after each
+    of these events.
+    """
     elements = {"scenario": scenario or {}, "elements": ["a", "b", "c", "d"]}
     candidates = [[kind, part, None] for part in (0, 1) for kind in ("partition", "complement")]
     parts = {"environment": [0, 1, 2, 3], "partitions": [[0], [1, 2]], "candidates": candidates}
@@ -93,9 +95,11 @@ def test_the_baseline_says_how_the_robot_failed_in_f():
         *happened, ("baseline_finished", found | more), scenario={"reduction": {"iterations": 3}}
     )[-1]
     assert baseline(state) == (
-        "Baseline: the robot got stuck in 1 of 3 runs (33 %, 95 % interval 10 % to 70 %); 2 more runs broke. "
+        "Baseline: the robot got stuck in 1 of 3 runs (33 %, 95 % interval 10 % to 70 %); 2 more "
+        "runs broke. "
         "Other failures: 2. fell or lost at (3.00, 0.00) in 1 run (--failure selects another one). "
-        "The chance that 4 runs of a candidate miss f is 20 % (at most 66 %); for a 95 % chance of seeing f, use --iterations 7."
+        "The chance that 4 runs of a candidate miss f is 20 % (at most 66 %); for a 95 % chance "
+        "of seeing f, use --iterations 7."
     )
 
 

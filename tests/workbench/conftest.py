@@ -65,7 +65,9 @@ def scenarios(tmp_path, monkeypatch) -> Path:
 
 @pytest.fixture
 def started(monkeypatch) -> list[tuple]:
-    """What engines were started with, instead of starting them: the run's file name, jobs and options."""
+    """What engines were started with, instead of starting them: the run's file name, jobs and
+    options.
+    """
     calls = []
 
     def start_engine(path, jobs, **options):

@@ -27,7 +27,9 @@ def mid_round(run: FakeRun) -> FakeRun:
 
 
 def sliced(run: FakeRun) -> FakeRun:
-    """In the first round of a slice the test of the third candidate is implied by that of the second; the next one runs."""
+    """In the first round of a slice the test of the third candidate is implied by that of the
+    second; the next one runs.
+    """
     run.created().write("still")
     run.met = [f"crate_{number:02}" for number in (2, 3, 4, 6, 7)]
     run.baseline()
@@ -83,7 +85,9 @@ def _rounds(run: FakeRun) -> FakeRun:
 
 
 def guided(run: FakeRun) -> FakeRun:
-    """Two reductions, one taken back; a pinned model; three selections by hand: one adopted, one in vain, one under way."""
+    """Two reductions, one taken back; a pinned model; three selections by hand: one adopted, one in
+    vain, one under way.
+    """
     run.created().baseline()
     run.start_round(2)
     left = run.elements[:6]
@@ -142,7 +146,9 @@ def faster_without(run: FakeRun) -> FakeRun:
 
 
 def isolating(run: FakeRun) -> FakeRun:
-    """After its end, isolation: the robot passes without the two models that were left; without one of them it is being tried."""
+    """After its end, isolation: the robot passes without the two models that were left; without one
+    of them it is being tried.
+    """
     finished(run).start_isolation(2)
     both = run.remove("crate_00", "crate_01")
     run.write(

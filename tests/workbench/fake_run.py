@@ -33,14 +33,17 @@ def box(
 ) -> str:
     width, depth, height = size
     return (
-        f'<model name="{name}"><static>true</static><pose>{x} {y} {height / 2} 0 0 {yaw}</pose><link name="link">'
-        f'<collision name="box"><geometry><box><size>{width} {depth} {height}</size></box></geometry></collision>'
+        f'<model name="{name}"><static>true</static><pose>{x} {y} {height / 2} 0 0 '
+        f'{yaw}</pose><link name="link">'
+        f'<collision name="box"><geometry><box><size>{width} {depth} '
+        f"{height}</size></box></geometry></collision>"
         f"</link></model>"
     )
 
 
 GROUND = (
-    '<model name="ground_plane"><static>true</static><link name="link"><collision name="plane"><geometry>'
+    '<model name="ground_plane"><static>true</static><link name="link"><collision '
+    'name="plane"><geometry>'
     "<plane><normal>0 0 1</normal></plane></geometry></collision></link></model>"
 )
 
@@ -68,13 +71,17 @@ def scenario(protected: tuple[str, ...] = ("floor",), name: str = "crates") -> d
 
 
 def as_printed() -> dict:
-    """The same with the settings of the paper: the screens show its lines, and the rounds below are its rounds."""
+    """The same with the settings of the paper: the screens show its lines, and the rounds below are
+    its rounds.
+    """
     data = scenario()
     return data | {"reduction": data["reduction"] | PRINTED}
 
 
 class FakeRun:
-    """A run file and the events an engine would write. `with run.engine():` holds the lock as an engine does."""
+    """A run file and the events an engine would write. `with run.engine():` holds the lock as an
+    engine does.
+    """
 
     def __init__(self, path: Path, data: dict | None = None, world: bytes | None = None) -> None:
         data = data or as_printed()
@@ -220,7 +227,9 @@ class FakeRun:
         return self.tests
 
     def certify_all(self, node: int, without: str | None, outcomes: str) -> None:
-        """A run for each letter: s similar, p pass, o another failure, e broken; none where there is a point."""
+        """A run for each letter: s similar, p pass, o another failure, e broken; none where there
+        is a point.
+        """
         words = {
             "s": ("similar", 0.12, "stuck"),
             "p": ("pass", None, ""),
@@ -299,7 +308,9 @@ class FakeRun:
         return self.tests
 
     def isolate_all(self, removal: int, outcomes: str, first: int = 0) -> list[int]:
-        """A run for each letter as in `certify_all`; one that reaches the goal goes 1 m further to the side."""
+        """A run for each letter as in `certify_all`; one that reaches the goal goes 1 m further to
+        the side.
+        """
         words = {
             "s": ("similar", 0.12, "stuck"),
             "p": ("pass", None, ""),
@@ -362,7 +373,9 @@ class FakeRun:
     def start_round(
         self, parts: int, environment: list[str] | None = None, pinned: tuple[str, ...] = ()
     ) -> None:
-        """A round of `parts` partitions of neighbours, each with its complement; `pinned` models are in all of them."""
+        """A round of `parts` partitions of neighbours, each with its complement; `pinned` models
+        are in all of them.
+        """
         self.round += 1
         whole = self.numbers(environment or self.elements)
         kept = [number for number in whole if self.elements[number] not in pinned]

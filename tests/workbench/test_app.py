@@ -1,4 +1,6 @@
-"""What holds on every screen: help, the list of commands, keys of the user's own, and the program in a browser."""
+"""What holds on every screen: help, the list of commands, keys of the user's own, and the program
+in a browser.
+"""
 
 import asyncio
 import os

@@ -1,4 +1,6 @@
-"""The table of candidates: what it lists, where its cursor is, and that only what is seen is made into text."""
+"""The table of candidates: what it lists, where its cursor is, and that only what is seen is made
+into text.
+"""
 
 from dataclasses import replace
 

@@ -1,4 +1,6 @@
-"""Without any colour, brightness included, every screen says the same: what keys change is seen in signs and text styles."""
+"""Without any colour, brightness included, every screen says the same: what keys change is seen in
+signs and text styles.
+"""
 
 import fake_moments
 import fake_run

@@ -1,4 +1,6 @@
-"""The file with a user's keys and theme: what it can say, and that whatever is wrong in it is told in one line."""
+"""The file with a user's keys and theme: what it can say, and that whatever is wrong in it is told
+in one line.
+"""
 
 import subprocess
 import sys

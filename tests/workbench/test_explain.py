@@ -71,7 +71,8 @@ def writes(kind, **data):
 
 NEVER = writes("finished", minimal=False, reason="the robot never failed in 4 runs")
 CUT = lambda run: run.baseline().write("finished", minimal=False, reason="stopped early")  # noqa: E731
-# What happens after a run was created, the line of the algorithm, and words that are said; first while an engine works.
+# What happens after a run was created, the line of the algorithm, and words that are said; first
+# while an engine works.
 WORKING = (
     (counted, 0, "Of 2 runs so far 1 failed and 1 reached the goal"),
     (
@@ -118,7 +119,10 @@ def test_line_and_words_say_what_happens(run, case, engine):
     assert make is not NEVER or found[1] == words[0]
 
 
-MINIMAL = "Minimal: 2 models left. No single model can be removed: f in 23 of 23 fresh runs (80 % to 100 %), at least 81 %"
+MINIMAL = (
+    "Minimal: 2 models left. No single model can be removed: f in 23 of 23 fresh runs (80 % to "
+    "100 %), at least 81 %"
+)
 MEANS = "Minimal means: what is left keeps at least 81 % of the whole world's rate"
 CERTIFIES = "they have to show that what is left keeps 66 % of the whole world's rate"
 MOMENTS = (
@@ -222,7 +226,8 @@ def test_after_a_step_its_result_is_shown(run):
     assert "part A showed f: 11 → 6 models. Next is part A (2 models)" in told(run)[1]
     run.test(0, "pass")
     assert told(run)[1].endswith(
-        "Next is re-run 1 of 3 of part A (2 models), candidate 1 of 6: last time the goal was reached."
+        "Next is re-run 1 of 3 of part A (2 models), candidate 1 of 6: last time the goal was "
+        "reached."
     )
 
 
@@ -232,9 +237,9 @@ def test_what_showed_f_is_run_again_until_it_is_clear_that_it_keeps_the_rate(run
     run.test(0, "similar", 0.1, failure="stuck")
     run.test(0, "pass", run=1)
     assert (
-        "Next is one more run of part A (6 models), candidate 1 of 2: f showed in 1 of 2 runs so far."
-        in told(run)[1]
-    )
+        "Next is one more run of part A (6 models), candidate 1 of 2: f showed in 1 of 2 runs so "
+        "far."
+    ) in told(run)[1]
     run.live((run.start(0, 2), 0.4))
     words = told(run)[1]
     assert "Run 3 of part A (6 models), candidate 1 of 2: f showed in 1 of 2 runs so far." in words
@@ -244,9 +249,9 @@ def test_what_showed_f_is_run_again_until_it_is_clear_that_it_keeps_the_rate(run
 def test_where_f_is_rarer_the_key_that_goes_back_is_named(run):
     words = told(fake_moments.rarer(run))[1]
     assert (
-        "f is rarer than it was: f in 1 of 6 here, 3 of 4 in the whole world. u goes back to 11 models."
-        in words
-    )
+        "f is rarer than it was: f in 1 of 6 here, 3 of 4 in the whole world. u goes back to 11 "
+        "models."
+    ) in words
     assert (
         "rarer"
         not in told(fake_moments.mid_round(fake_run.FakeRun(run.path.with_name("b.ddenv"))))[1]

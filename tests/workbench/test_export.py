@@ -1,4 +1,6 @@
-"""The export dialog: writes the chosen files, asks before it replaces any, and says in one line what is wrong."""
+"""The export dialog: writes the chosen files, asks before it replaces any, and says in one line
+what is wrong.
+"""
 
 from contextlib import asynccontextmanager
 

@@ -61,9 +61,9 @@ async def test_pausing_stepping_and_vetoing(run):
         assert session.asked() == [("undo", {})]
         assert "part A is taken back. A new search begins from 11 models." in said
         assert (
-            "It will not reduce to these 6 again, in any branch, unless you allow it: v on their row"
-            in said
-        )
+            "It will not reduce to these 6 again, in any branch, unless you allow it: v on their "
+            "row"
+        ) in said
         await session.press("u")
         assert session.asked() == []
         assert "the last undo is not done yet" in session.said()

@@ -117,7 +117,7 @@ async def test_enter_goes_back_after_a_question_and_starts_an_engine_where_none_
         assert session.app.screen is session.screen
         assert session.asked() == [("go_back", {"node": 1})]
         assert (
-            "back to 6 models (#1, part A); the run pauses there, and space begins a new search; an engine"
-            in session.said()
-        )
+            "back to 6 models (#1, part A); the run pauses there, and space begins a new search; "
+            "an engine"
+        ) in session.said()
         assert len(started) == 1

@@ -1,4 +1,6 @@
-"""Names, files and hands that mean no good: whatever they are, the screen stands, and the terminal is not steered."""
+"""Names, files and hands that mean no good: whatever they are, the screen stands, and the terminal
+is not steered.
+"""
 
 import html
 import io
@@ -140,7 +142,10 @@ def test_a_locked_run_is_read_again(run):
     assert folder.look()[0].status == "finished"
 
 
-NAMED = "up down left right enter space tab shift+tab escape home end pageup pagedown backspace plus minus slash"
+NAMED = (
+    "up down left right enter space tab shift+tab escape home end pageup pagedown backspace plus "
+    "minus slash"
+)
 NAMED += " shift+up question_mark left_square_bracket right_square_bracket f1 ctrl+p"
 KEYS = [*NAMED.split(), *"abcefghijklnopstuvwxyzACEGLNPSW0123456"]
 SIZES = [(20, 5), (1, 1), (64, 18), (80, 24), (120, 36), (300, 100)]

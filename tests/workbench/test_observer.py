@@ -1,4 +1,6 @@
-"""A screen looks at a run file: whatever becomes of the file, it neither writes, nor waits, nor falls over."""
+"""A screen looks at a run file: whatever becomes of the file, it neither writes, nor waits, nor
+falls over.
+"""
 
 import os
 import sqlite3

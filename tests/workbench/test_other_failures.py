@@ -20,9 +20,9 @@ async def test_another_failure_is_accepted_after_a_question(run):
         assert isinstance(session.app.screen, Question)
         words = " ".join(session.dialog().split())
         assert (
-            "In part A (3 models) the robot tipped over at (2.00, 0.40, 0.20) m, 2.30 m from f's end."
-            in words
-        )
+            "In part A (3 models) the robot tipped over at (2.00, 0.40, 0.20) m, 2.30 m from f's "
+            "end."
+        ) in words
         assert "In f it got stuck at (2.00, 0.40, 0.20) m." in words
         await session.press("n")
         assert session.asked() == []

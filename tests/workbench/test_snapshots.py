@@ -1,4 +1,6 @@
-"""What the screens look like. Update with `pytest tests/workbench --snapshot-update` after looking at them."""
+"""What the screens look like. Update with `pytest tests/workbench --snapshot-update` after looking
+at them.
+"""
 
 import math
 from contextlib import suppress
@@ -30,7 +32,9 @@ def no_clock(monkeypatch):
 
 
 async def settled(pilot):
-    """Waits until nothing changes any more: the map is drawn after the first frame, and looks are made ten times a second."""
+    """Waits until nothing changes any more: the map is drawn after the first frame, and looks are
+    made ten times a second.
+    """
     await pilot.pause()
     shown, same = None, 0
     for _ in range(300):
@@ -116,8 +120,8 @@ def test_run_screen_without_its_engine(snap_compare, run):
     assert snap_compare(Workbench(run.path), terminal_size=USUAL, run_before=settled)
 
 
-# The dialogs and screens that a key opens over a run; the table's first rows are trials. Not those that show folders, which
-# are others in each run of the tests.
+# The dialogs and screens that a key opens over a run; the table's first rows are trials. Not those
+# that show folders, which are others in each run of the tests.
 OPENED = {
     "help": ["question_mark"],
     "palette": ["ctrl+p"],

@@ -26,7 +26,9 @@ def loaded(path):
 
 
 def assert_same_in_drake(world, path):
-    """Every link of `world` is in the plant of `path`, at its place, with its shapes and its mass."""
+    """Every link of `world` is in the plant of `path`, at its place, with its shapes and its
+    mass.
+    """
     plant, _, context = loaded(path)
     again = read_world(path)
     assert len(again.elements()) == len(world.elements())
@@ -74,9 +76,12 @@ JOINTS = (
 def test_what_drake_refuses_in_the_original_is_written_so_that_it_loads(tmp_path):
     points = "<point>0 0</point><point>1 0</point><point>0 1</point>"
     shapes = (
-        f"<collision name='c'><geometry><polyline><height>1</height>{points}</polyline></geometry></collision>"
-        "<collision name='c'><geometry><capsule><radius>1</radius><length>1</length></capsule></geometry></collision>"
-        "<collision name='d'><geometry><ellipsoid><radii>1 2 3</radii></ellipsoid></geometry></collision>"
+        "<collision "
+        f"name='c'><geometry><polyline><height>1</height>{points}</polyline></geometry></collision>"
+        "<collision "
+        "name='c'><geometry><capsule><radius>1</radius><length>1</length></capsule></geometry></collision>"
+        "<collision name='d'><geometry><ellipsoid><radii>1 2 "
+        "3</radii></ellipsoid></geometry></collision>"
         "<visual name='v'><geometry><sphere><radius>1</radius></sphere></geometry></visual>"
     )
     nested = f"<model name='in'><pose>0 0 1 1 0 0</pose><link name='a'>{shapes}</link></model>"

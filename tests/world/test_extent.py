@@ -1,4 +1,6 @@
-"""The boxes around shapes are as small as can be; infinite planes become boxes that reach as far as anything does."""
+"""The boxes around shapes are as small as can be; infinite planes become boxes that reach as far as
+anything does.
+"""
 
 import numpy as np
 import pytest
@@ -88,11 +90,17 @@ def test_a_model_is_the_box_around_all_its_shapes_but_planes():
 def world(*places):
     box = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
     models = "".join(
-        f"<model name='m{n}'><static>1</static><pose>{x} {y} 0.5 0 0 0</pose><link name='l'>{box}</link></model>"
+        (
+            f"<model name='m{n}'><static>1</static><pose>{x} {y} 0.5 0 0 0</pose><link "
+            f"name='l'>{box}</link></model>"
+        )
         for n, (x, y) in enumerate(places)
     )
     plane = "<collision name='c'><geometry><plane/></geometry></collision>"
-    ground = f"<model name='g'><static>1</static><pose>0 0 0.25 0 0 1</pose><link name='l'>{plane}</link></model>"
+    ground = (
+        "<model name='g'><static>1</static><pose>0 0 0.25 0 0 1</pose><link "
+        f"name='l'>{plane}</link></model>"
+    )
     text = f"<sdf version='1.9'><world name='w'>{ground}{models}</world></sdf>"
     return parse_world(text.encode(), ROOT / "w.sdf")
 

@@ -1,4 +1,6 @@
-"""Files that mean harm, or that nobody looked at, beside a world: one line, exit code 2, and soon."""
+"""Files that mean harm, or that nobody looked at, beside a world: one line, exit code 2, and
+soon.
+"""
 
 import os
 import re
@@ -50,7 +52,10 @@ def test_defaults_of_a_document_type_never_fill_the_memory(tmp_path, refused, pl
 
 @pytest.mark.parametrize("entity", ["'ha'", "SYSTEM 'file:///etc/passwd'"])
 def test_entities_are_refused_in_included_files_too(check, tmp_path, entity):
-    text = f"<!DOCTYPE sdf [<!ENTITY l0 {entity}>{LAUGHS}]><sdf version='1.9'><model name='m'>&l9;</model></sdf>"
+    text = (
+        f"<!DOCTYPE sdf [<!ENTITY l0 {entity}>{LAUGHS}]><sdf version='1.9'><model "
+        "name='m'>&l9;</model></sdf>"
+    )
     (tmp_path / "bomb.sdf").write_text(text)
     said, path = check(world(include("bomb.sdf")))
     assert re.search(r"/bomb\.sdf:1:1: DOCTYPE is not allowed \(its entities", refusal(said, path))

@@ -76,7 +76,10 @@ MANY = {
     ),
     "namesakes that are long": lambda: world(
         frame("".join(chr(0x4E00 + i * i % 20_000) for i in range(60_000)), "")
-        + f"<model name='m'><pose relative_to='{''.join(chr(0x4E00 + i * i % 19_997) for i in range(60_000))}'/>"
+        + (
+            "<model name='m'><pose "
+            f"relative_to='{''.join(chr(0x4E00 + i * i % 19_997) for i in range(60_000))}'/>"
+        )
         + f"{LINK}</model>"
     ),
 }

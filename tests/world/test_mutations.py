@@ -1,4 +1,6 @@
-"""Worlds that are broken in a thousand ways: each reads as something sound, or is refused in one line that points."""
+"""Worlds that are broken in a thousand ways: each reads as something sound, or is refused in one
+line that points.
+"""
 
 from __future__ import annotations
 
@@ -42,10 +44,15 @@ def test_the_worlds_themselves_are_sound(name):
     check_smaller_worlds(world)
 
 
-BOX = "<link name='l'><collision name='c'><geometry><box><size>1 2 3</size></box></geometry></collision></link>"
+BOX = (
+    "<link name='l'><collision name='c'><geometry><box><size>1 2 "
+    "3</size></box></geometry></collision></link>"
+)
 OUTLINE = (
-    "<model name='{}'><static>1</static><link name='l'><collision name='c'><geometry><polyline><height>{}</height>"
-    "<point>0 0</point><point>1 0</point><point>0 1</point></polyline></geometry></collision></link></model>"
+    "<model name='{}'><static>1</static><link name='l'><collision "
+    "name='c'><geometry><polyline><height>{}</height>"
+    "<point>0 0</point><point>1 0</point><point>0 "
+    "1</point></polyline></geometry></collision></link></model>"
 )
 
 
@@ -94,10 +101,16 @@ def test_a_model_that_others_stand_on_stays_whatever_its_name(name):
 def test_joints_whose_names_are_taken_keep_their_places_or_are_refused(names):
     """Also those called as a link or a frame of their model: before SDF 1.7 that was allowed."""
     joints = "".join(
-        f"<joint name='{name}' type='fixed'><pose>{5 * at} 0 0 0 0 0</pose><parent>{parent}</parent><child>{child}</child></joint>"
+        (
+            f"<joint name='{name}' type='fixed'><pose>{5 * at} 0 0 0 0 "
+            f"0</pose><parent>{parent}</parent><child>{child}</child></joint>"
+        )
         for at, (name, parent, child) in enumerate(zip(names, "ab", "bc", strict=True), start=1)
     )
-    inside = "<link name='a'/><link name='b'><pose>1 0 0 0 0 0</pose></link><link name='c'/><frame name='f'/>"
+    inside = (
+        "<link name='a'/><link name='b'><pose>1 0 0 0 0 0</pose></link><link name='c'/><frame "
+        "name='f'/>"
+    )
     try:
         world = small_world(f"<model name='m'>{inside}{joints}</model>")
     except UserError as error:

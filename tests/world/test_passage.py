@@ -1,4 +1,6 @@
-"""Which robot gets to the goal, as far as walls tell; and where a start inside a wall is moved to."""
+"""Which robot gets to the goal, as far as walls tell; and where a start inside a wall is moved
+to.
+"""
 
 import math
 from dataclasses import replace

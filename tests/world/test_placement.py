@@ -1,4 +1,6 @@
-"""What stands inside what, and how deep: no robot starts inside something, or in the air, unnoticed."""
+"""What stands inside what, and how deep: no robot starts inside something, or in the air,
+unnoticed.
+"""
 
 import math
 from dataclasses import replace
@@ -83,7 +85,9 @@ ROUND = (Sphere(0.3), Capsule(0.2, 0.6))
 
 
 def true_depth(a: Hull, b: Hull) -> float:
-    """How far zero is inside the hull of all differences between points of both bodies: slow, and the definition."""
+    """How far zero is inside the hull of all differences between points of both bodies: slow, and
+    the definition.
+    """
     differences = (a.vertices[:, None] - b.vertices[None]).reshape(-1, 3)
     return max(0.0, float((-ConvexHull(differences).equations[:, 3]).min()))
 
@@ -353,7 +357,9 @@ def test_a_floor_that_carries_everything_is_offered_to_stay(width, top, ground, 
 
 
 def seen_as(*visuals):
-    """A world of a post that all can see, and one with a collision of 1.5 m that is drawn in these `visuals`."""
+    """A world of a post that all can see, and one with a collision of 1.5 m that is drawn in these
+    `visuals`.
+    """
     box = "<geometry><box><size>{0} {0} 2</size></box></geometry>"
     link = "<link name='l'><collision name='c'>{}</collision>{}</link>"
     models = [

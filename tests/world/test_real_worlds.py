@@ -1,4 +1,6 @@
-"""Two worlds that Gazebo saved, kept beside the checkout: read as Gazebo had them, and written as they were."""
+"""Two worlds that Gazebo saved, kept beside the checkout: read as Gazebo had them, and written as
+they were.
+"""
 
 from xml.etree import ElementTree
 
@@ -71,7 +73,9 @@ def test_a_smaller_world_is_the_same_text_without_the_removed_models_and_their_s
 
 
 def _by_hand(text, removed):
-    """The lines of `text` but those from a removed model's opening tag to its closing one, wherever such a model stands."""
+    """The lines of `text` but those from a removed model's opening tag to its closing one, wherever
+    such a model stands.
+    """
     kept, closing = [], None
     for line in text.split(b"\n"):
         bare = line.strip()

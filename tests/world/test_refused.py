@@ -32,7 +32,8 @@ def with_dtd(inside: str, entities: str) -> bytes:
     return world(inside, before=f"<!DOCTYPE sdf {entities}>")
 
 
-# The first words of each row of the guide's table, what is said, and of which files. These have no element to point at.
+# The first words of each row of the guide's table, what is said, and of which files. These have no
+# element to point at.
 OF_THE_FILE: dict[str, dict[str, list[bytes]]] = {
     "an empty file, a folder": {": the file is empty; expected an SDF file": [b"", b" \n\t\n"]},
     "XML that TinyXML2": {
@@ -60,7 +61,11 @@ OF_THE_FILE: dict[str, dict[str, list[bytes]]] = {
         ],
     },
     "a DOCTYPE, and": {
-        r":1:1: DOCTYPE is not allowed \(its entities can read other files and exhaust memory\); remove it": [
+        (
+            r":1:1: DOCTYPE is not allowed \(its entities can read other files and exhaust "
+            r"memory\); "
+            r"remove it"
+        ): [
             with_dtd(MODEL, f"[<!ENTITY l0 'ha'>{LAUGHS}]") + b"&l9;",
             with_dtd("&a;" * 1000, f"[<!ENTITY a '{'a' * 10000}'>]"),
             *(
@@ -108,8 +113,14 @@ OF_THE_FILE: dict[str, dict[str, list[bytes]]] = {
     },
     "macros of xacro": {
         r":1: /sdf/.*: is xacro, not SDF; run 'xacro FILE > new.sdf'": [
-            b"<sdf version='1.9' xmlns:xacro='http://www.ros.org/wiki/xacro'><xacro:arg name='a'/><world name='w'/></sdf>",
-            b"<sdf version='1.9' xmlns:x='http://www.ros.org/wiki/xacro'><world name='w'><x:include filename='a'/></world></sdf>",
+            (
+                b"<sdf version='1.9' xmlns:xacro='http://www.ros.org/wiki/xacro'><xacro:arg "
+                b"name='a'/><world name='w'/></sdf>"
+            ),
+            (
+                b"<sdf version='1.9' xmlns:x='http://www.ros.org/wiki/xacro'><world "
+                b"name='w'><x:include filename='a'/></world></sdf>"
+            ),
         ]
     },
 }
@@ -245,7 +256,8 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
             f"<model name='m'>{TWO}<joint name='' type='fixed'>{AB}</joint></model>"
         ),
         r"/frame(\[@name='\s*'\])?: has no name": nameless(
-            f"<model name='m'>{LINK}<frame name=''/><link name='k'><pose relative_to='l'/></link></model>"
+            f"<model name='m'>{LINK}<frame name=''/><link name='k'><pose "
+            "relative_to='l'/></link></model>"
         ),
         r"/state/model: has no name": [world("<state><model/></state>")],
     },
@@ -284,7 +296,8 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
         "there is no frame '[ao]' here": [
             on_frame_a(),
             world(
-                f"<model name='m'>{LINK}<link name='k'><pose relative_to='o'/></link></model><model name='o'/>"
+                f"<model name='m'>{LINK}<link name='k'><pose "
+                "relative_to='o'/></link></model><model name='o'/>"
             ),
             world(f"<model name='m' placement_frame='a'>{LINK}</model>"),
         ],
@@ -337,9 +350,11 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
         "'model://nowhere' was not found": [world(include("model://nowhere"))]
     },
     "`<include merge='true'>` in a world": {
-        "merge='true' puts the links of a model into the model around it; here is none; leave it out with --ignore": [
-            world("<include merge='true'><uri>model://nowhere</uri></include>")
-        ]
+        (
+            "merge='true' puts the links of a model into the model around it; here is none; "
+            "leave it "
+            "out with --ignore"
+        ): [world("<include merge='true'><uri>model://nowhere</uri></include>")]
     },
     "includes in a cycle": {"form a cycle": [world(include("hostile.world"))]},
     "a URI that leaves its folder": {

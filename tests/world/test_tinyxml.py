@@ -1,4 +1,6 @@
-"""Our reader of XML: what a strict parser reads it reads alike, what TinyXML2 lets through too, and nothing breaks it."""
+"""Our reader of XML: what a strict parser reads it reads alike, what TinyXML2 lets through too, and
+nothing breaks it.
+"""
 
 import os
 import re
@@ -26,7 +28,9 @@ BATCHES = slow(
 
 
 def by_expat(text):
-    """Tag, attributes, text before the first child, line and byte range of each element, in the file's order; None if refused."""
+    """Tag, attributes, text before the first child, line and byte range of each element, in the
+    file's order; None if refused.
+    """
     parser, found, open_elements = expat.ParserCreate(), [], []
     parser.buffer_text = True
 
@@ -271,7 +275,10 @@ def test_time_grows_with_the_size_and_not_with_its_square(text):
 
 PIECES = st.sampled_from(
     [
-        *b"< > / a b = ' \" & # x ; 1 ! - -- [CDATA[ ]]> ? ?> <!-- --> : <a> </a> &amp; utf-16 cp1252 '?> \xff \xc3\xa9".split(),
+        *(
+            b"< > / a b = ' \" & # x ; 1 ! - -- [CDATA[ ]]> ? ?> <!-- --> : <a> </a> &amp; "
+            b"utf-16 cp1252 '?> \xff \xc3\xa9"
+        ).split(),
         *(
             b" ",
             b"\n",

@@ -19,7 +19,9 @@ DITCH = read_world(SDF / "worlds" / "ditch.sdf")
 
 @given(removed=st.sets(st.sampled_from(DITCH.elements()), max_size=43))
 def test_only_whole_lines_go(removed):
-    """Every byte that is left was there, in the same order, and each model took just its own lines with it."""
+    """Every byte that is left was there, in the same order, and each model took just its own lines
+    with it.
+    """
     text = without(DITCH, frozenset(removed))
     spans = [DITCH.model(name).spans[0] for name in removed]
     gone = {number for start, end in spans for number in range(_line(start), _line(end) + 1)}

@@ -1,4 +1,6 @@
-"""The simulator of drive.py as a class, which also says which models took part: those that the robot touched."""
+"""The simulator of drive.py as a class, which also says which models took part: those that the
+robot touched.
+"""
 
 import math
 import random

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
-"""A simulator in sixty lines: a round robot, seen from above, heads for its goal and slides along what is in its way.
+"""A simulator in sixty lines: a round robot, seen from above, heads for its goal and slides along
+what is in its way.
 
-drive.py WORLD SEED; the rest is in environment variables. Prints the pose log. Exit codes: 0 goal reached, 1 time is up.
+drive.py WORLD SEED; the rest is in environment variables. Prints the pose log. Exit codes: 0 goal
+reached, 1 time is up.
 """
 
 import math
@@ -15,7 +17,9 @@ NOISE = 0.1  # of the heading, rad
 
 
 def obstacles(file, name=None):
-    """x, y, yaw, half length, half width and radius of each collision, or of those of the model `name`."""
+    """x, y, yaw, half length, half width and radius of each collision, or of those of the model
+    `name`.
+    """
     found = []
     for model in ET.parse(file).getroot().iter("model"):
         if name not in (None, model.get("name")):
@@ -51,9 +55,8 @@ def main():
     noise, there = random.Random(int(seed)), obstacles(world)
     print("t,x,y,z,qx,qy,qz,qw")
     for step in range(round(float(os.environ["DDENV_TIMEOUT"]) / STEP) + 1):
-        print(
-            f"{step * STEP:.2f},{x:.4f},{y:.4f},{z:.4f},0,0,{math.sin(yaw / 2):.6f},{math.cos(yaw / 2):.6f}"
-        )
+        turn = f"{math.sin(yaw / 2):.6f},{math.cos(yaw / 2):.6f}"
+        print(f"{step * STEP:.2f},{x:.4f},{y:.4f},{z:.4f},0,0,{turn}")
         if math.hypot(goal_x - x, goal_y - y) <= tolerance:
             return 0
         yaw = math.atan2(goal_y - y, goal_x - x) + noise.gauss(0, NOISE)

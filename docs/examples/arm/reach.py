@@ -1,4 +1,5 @@
-"""An arm as a simulator: Drake's own InverseDynamicsController moves it among the models of each test's directives.
+"""An arm as a simulator: Drake's own InverseDynamicsController moves it among the models of each
+test's directives.
 
 The hand comes down in front of a corridor between a shelf and a bin, and reaches into it.
 """

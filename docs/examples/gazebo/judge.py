@@ -1,4 +1,6 @@
-"""Sends the goal to Nav2, logs the robot's true pose, and exits with 0 at the goal or 1 when the simulated time is up. Untested."""
+"""Sends the goal to Nav2, logs the robot's true pose, and exits with 0 at the goal or 1 when the
+simulated time is up. Untested.
+"""
 
 import math
 import os

@@ -1,6 +1,8 @@
-"""The robot of a scenario in MuJoCo, with the sensors, the pose estimate and the controller that it has in Drake.
+"""The robot of a scenario in MuJoCo, with the sensors, the pose estimate and the controller that it
+has in Drake.
 
-simulator.yaml names the class MuJoCo. drive.py SCENARIO prints the MJCF. Needs ddenv-workbench and `pip install mujoco`.
+simulator.yaml names the class MuJoCo. drive.py SCENARIO prints the MJCF. Needs ddenv-workbench and
+`pip install mujoco`.
 """
 
 from __future__ import annotations
@@ -56,7 +58,8 @@ class Simulation:
     def __init__(self, parts: Parts) -> None:
         import mujoco
 
-        # By default MuJoCo writes warnings to a file in the current folder, and starts again after a number that is not finite.
+        # By default MuJoCo writes warnings to a file in the current folder, and starts again after
+        # a number that is not finite.
         self._warnings: list[str] = []
         mujoco.set_mju_user_warning(self._warnings.append)
         self._advance, self._steps = mujoco.mj_step, parts.steps
@@ -80,7 +83,9 @@ class Simulation:
         ]
 
     def advance(self, steps: int, speeds: np.ndarray) -> None:
-        """Simulates `steps` of the clock with the joint speeds that the wheels shall have, rad/s. Raises Broken."""
+        """Simulates `steps` of the clock with the joint speeds that the wheels shall have, rad/s.
+        Raises Broken.
+        """
         self._data.ctrl[:] = speeds
         self._advance(self._model, self._data, nstep=steps * self._steps)
         if self._warnings:
@@ -105,14 +110,18 @@ class Simulation:
         )
 
     def links(self) -> tuple[np.ndarray, np.ndarray]:
-        """Places (L, 3) m and rotations (L, 3, 3) of the links of all models that can move, in the order of the world."""
+        """Places (L, 3) m and rotations (L, 3, 3) of the links of all models that can move, in the
+        order of the world.
+        """
         return self._data.xpos[self._links].copy(), self._data.xmat[self._links].reshape(
             -1, 3, 3
         ).copy()
 
 
 def drive(parts: Parts, seed: int) -> Iterator[tuple[float, tuple[float, ...]]]:
-    """One run: yields time and pose of the robot, and returns how it ended. Raises Broken and BadCode."""
+    """One run: yields time and pose of the robot, and returns how it ended. Raises Broken and
+    BadCode.
+    """
     scenario, world = parts.scenario, parts.world
     simulation, suite = Simulation(parts), SensorSuite(scenario.sensors, seed)
     setup = setup_of(parts.robot, parts.drive, parts.clock, scenario, seed)

@@ -1,7 +1,8 @@
 """A world and a robot of ddenv as MJCF, MuJoCo's own format; needs no MuJoCo.
 
-Boxes, cylinders, spheres, capsules, ellipsoids and planes stay what they are. A mesh is its convex hull, as in Drake. Models that
-never move belong to MuJoCo's world body, links of all others are bodies of their own.
+Boxes, cylinders, spheres, capsules, ellipsoids and planes stay what they are. A mesh is its convex
+hull, as in Drake. Models that never move belong to MuJoCo's world body, links of all others are
+bodies of their own.
 """
 
 from __future__ import annotations
@@ -40,17 +41,19 @@ class Unsupported(Exception):
 
 
 def mjcf(world: World, robot: Model, start: Pose, drive: Drive, gain: float, step: float) -> str:
-    """The text of an MJCF file: the robot's model frame is at `start`, and an actuator for each of `drive.joints`, in that order,
-    turns a wheel at the wanted speed, rad/s.
+    """The text of an MJCF file: the robot's model frame is at `start`, and an actuator for each of
+    `drive.joints`, in that order, turns a wheel at the wanted speed, rad/s.
 
-    `gain` (N m s/rad) turns a wheel's speed error into torque, `step` (s) is the time step. Raises Unsupported.
+    `gain` (N m s/rad) turns a wheel's speed error into torque, `step` (s) is the time step. Raises
+    Unsupported.
     """
     models = (robot, *world.models)
     file = Writer([one.mu for model in models for one in model.collisions])
     option = SubElement(
         file.root, "option", timestep=text(step), gravity=text(*world.gravity), **OPTIONS
     )
-    # With several contacts of a pair of shapes, a wheel on the edge of a box is pushed back from the box's side.
+    # With several contacts of a pair of shapes, a wheel on the edge of a box is pushed back from
+    # the box's side.
     SubElement(option, "flag", multiccd="disable")
     for number, model in enumerate(models):
         # Poses of the robot are those in its own file.
@@ -66,7 +69,9 @@ def mjcf(world: World, robot: Model, start: Pose, drive: Drive, gain: float, ste
 
 
 def named(number: int, name: str) -> str:
-    """The name of a body or a joint in MJCF: that of a model with this number; the robot has 0, the world's models count from 1."""
+    """The name of a body or a joint in MJCF: that of a model with this number; the robot has 0, the
+    world's models count from 1.
+    """
     return f"{number} {name}"
 
 
@@ -85,8 +90,8 @@ class Writer:
         self._assets = SubElement(self.root, "asset")
         self._world = SubElement(self.root, "worldbody")
         self._contact = SubElement(self.root, "contact")
-        # Of two surfaces MuJoCo takes the friction of the one with the higher priority. Gazebo's ODE takes the smaller one: so the
-        # smoother a surface, the higher its priority.
+        # Of two surfaces MuJoCo takes the friction of the one with the higher priority. Gazebo's
+        # ODE takes the smaller one: so the smoother a surface, the higher its priority.
         self._priority = {
             mu: number for number, mu in enumerate(sorted(set(frictions), reverse=True))
         }
@@ -148,9 +153,11 @@ class Writer:
 
 
 def in_order(model: Model) -> Iterator[tuple[Link, Link | None, Joint | None]]:
-    """The links of a model, each with the link that it hangs on and the joint between them, parents first.
+    """The links of a model, each with the link that it hangs on and the joint between them, parents
+    first.
 
-    Without a joint a link floats; without a link it hangs on the world. Raises Unsupported where joints form a loop.
+    Without a joint a link floats; without a link it hangs on the world. Raises Unsupported where
+    joints form a loop.
     """
     joints: dict[str, Joint] = {}
     for joint in model.joints:
@@ -178,7 +185,9 @@ def at(place: Pose) -> dict[str, str]:
 
 
 def add_joints(body: Element, joint: Joint, link: Link, name: str) -> None:
-    """Adds `joint` to the body of the link that it moves; MuJoCo gives it in the axes of that link."""
+    """Adds `joint` to the body of the link that it moves; MuJoCo gives it in the axes of that
+    link.
+    """
     if is_fixed(joint):
         return
     frame = link.pose.inverse()

@@ -1,4 +1,6 @@
-"""A controller that heads for its goal, and gets around what its lidar sees ahead on the side with more room."""
+"""A controller that heads for its goal, and gets around what its lidar sees ahead on the side with
+more room.
+"""
 
 import math
 

@@ -1,7 +1,8 @@
 """The command line: all commands, and their exit codes.
 
-Exit codes: 0 done (for a reduction: shown to be minimal), 1 stopped before that, 2 wrong input, 130 interrupted. Those of
-`ddenv reproduce` are for `git bisect run`, which takes 1 to 124 for "it fails": it says 125 whenever it has no answer.
+Exit codes: 0 done (for a reduction: shown to be minimal), 1 stopped before that, 2 wrong input, 130
+interrupted. Those of `ddenv reproduce` are for `git bisect run`, which takes 1 to 124 for "it
+fails": it says 125 whenever it has no answer.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from ddenv.errors import UserError
 from ddenv.runs.folder import named
 from ddenv.schemas import nearest
 
-# The commands, and the file of each. Only that of the command that is used is loaded: the workbench is on the screen sooner.
+# The commands, and the file of each. Only that of the command that is used is loaded: the workbench
+# is on the screen sooner.
 COMMANDS = {
     **dict.fromkeys(("run", "resume", "certify"), "run"),
     **dict.fromkeys(("open", "serve"), "workbench"),
@@ -69,7 +71,8 @@ class Commands(click.Group):
 
             known = [*self.list_commands(ctx), *bundled_names()]
             raise UserError(
-                f"no command, run, scenario or world '{word}'{nearest(word, known)}; see 'ddenv --help'"
+                f"no command, run, scenario or world '{word}'{nearest(word, known)}; see 'ddenv "
+                "--help'"
             )
         return "open", self.get_command(ctx, "open"), args
 
@@ -91,7 +94,8 @@ class Commands(click.Group):
 @fetch_option
 @click.pass_context
 def app(context: click.Context, /, **reading: Any) -> None:
-    """Finds the few models of a world that make a robot fail. Without a command, or with a file or a run: the workbench.
+    """Finds the few models of a world that make a robot fail. Without a command, or with a file or
+    a run: the workbench.
 
     These options set how the workbench reads worlds; commands that read worlds have them, too.
     """
@@ -100,13 +104,15 @@ def app(context: click.Context, /, **reading: Any) -> None:
 
         if reading.pop("fetch"):
             raise UserError(
-                "--fetch: name the world that lacks models; in the workbench, f beside them does the same"
+                "--fetch: name the world that lacks models; in the workbench, f beside them does "
+                "the same"
             )
         context.exit(run_workbench(reading=given_reading(reading)))
     context.obj = reading
     if any(reading.values()) and context.invoked_subcommand != "open":
         raise UserError(
-            f"options for reading worlds go after the command: ddenv {context.invoked_subcommand} ..."
+            "options for reading worlds go after the command: ddenv "
+            f"{context.invoked_subcommand} ..."
         )
 
 
@@ -139,7 +145,8 @@ def _told(error: Exception, all_of_it: bool) -> int:
     elif isinstance(error, click.ClickException):
         context = error.ctx if isinstance(error, click.UsageError) else None
         if isinstance(error, click.NoSuchOption) and error.possibilities:
-            # Only those that are really like a mistyped one: their dashes alone make short ones alike.
+            # Only those that are really like a mistyped one: their dashes alone make short ones
+            # alike.
             word = error.option_name.lstrip("-")
             like = [
                 each for each in error.possibilities if get_close_matches(word, [each.lstrip("-")])
@@ -150,7 +157,8 @@ def _told(error: Exception, all_of_it: bool) -> int:
     elif isinstance(error, OSError) and (
         isinstance(error, BrokenPipeError) or error.filename is None
     ):
-        # Nobody reads the output any more (as with `| head`), or a disk is full. Else Python tries to write the rest at exit.
+        # Nobody reads the output any more (as with `| head`), or a disk is full. Else Python tries
+        # to write the rest at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if isinstance(error, BrokenPipeError):
             return 1

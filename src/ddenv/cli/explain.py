@@ -1,5 +1,6 @@
-"""Commands that say why a run fails: `ddenv why` from its fresh runs, `isolate` by the nearest world that passes, and `margins` by
-how far the numbers of what is left may change before the robot no longer fails as it did.
+"""Commands that say why a run fails: `ddenv why` from its fresh runs, `isolate` by the nearest
+world that passes, and `margins` by how far the numbers of what is left may change before the robot
+no longer fails as it did.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ BUDGET = 300
 @options.run_argument
 @options.json_option
 def why_command(run: str, as_json: bool) -> int:
-    """Says why the robot fails in what is left of RUN (a name or a file): what it does without each model, and where
-    the paths diverge. It uses the fresh runs of the certificate and makes no new test.
+    """Says why the robot fails in what is left of RUN (a name or a file): what it does without each
+    model, and where the paths diverge. It uses the fresh runs of the certificate and makes no new
+    test.
 
     After 'ddenv isolate RUN' it also says what the nearest world that passes lacks.
     """
@@ -78,8 +80,8 @@ def isolate_command(
     trust: bool,
     as_json: bool,
 ) -> int:
-    """Finds the nearest world that passes: as few models removed from the whole world of RUN (a name or a file) as it takes for the
-    robot to reach its goal. It changes nothing else.
+    """Finds the nearest world that passes: as few models removed from the whole world of RUN (a
+    name or a file) as it takes for the robot to reach its goal. It changes nothing else.
     """
     from ddenv.cli.follow import Interrupted, follow
     from ddenv.guiding.commands import Isolate, Situation
@@ -104,7 +106,8 @@ def isolate_command(
         except Interrupted as interrupted:
             if interrupted.state.isolating is not None or interrupted.state.isolated is None:
                 announce(
-                    f"interrupted; continue with: ddenv isolate {attach_name(path)}, or end it with --give-up"
+                    f"interrupted; continue with: ddenv isolate {attach_name(path)}, or end it "
+                    "with --give-up"
                 )
                 return 130
     with RunFile(path) as file:
@@ -113,7 +116,8 @@ def isolate_command(
     if found is None:
         # The engine was stopped from elsewhere.
         raise UserError(
-            f"{path}: the search for a world that passes was stopped; continue with: ddenv isolate {attach_name(path)}"
+            f"{path}: the search for a world that passes was stopped; continue with: ddenv "
+            f"isolate {attach_name(path)}"
         )
     if as_json:
         print(json.dumps({"nearest": asdict(found)}))
@@ -129,7 +133,8 @@ def isolate_command(
     "globs",
     multiple=True,
     metavar="GLOB",
-    help="Only numbers whose names match, such as green_patch_01.friction, '*.y' or controller.speed; may be repeated. "
+    help="Only numbers whose names match, such as green_patch_01.friction, '*.y' or "
+    "controller.speed; may be repeated. "
     "Without it the most promising ones come first.",
 )
 @click.option(
@@ -152,9 +157,10 @@ def margins_command(
     trust: bool,
     as_json: bool,
 ) -> int:
-    """Says how far each number in what is left of RUN (a name or a file) can change before f is gone, and from where the robot
-    reaches its goal: places, sizes and frictions of models, the start, the goal, the speed, the sensors. It changes nothing
-    else, and continues an interrupted search.
+    """Says how far each number in what is left of RUN (a name or a file) can change before f is
+    gone, and from where the robot reaches its goal: places, sizes and frictions of models, the
+    start, the goal, the speed, the sensors. It changes nothing else, and continues an interrupted
+    search.
     """
     from ddenv.cli.follow import Interrupted, follow
     from ddenv.engine.margins import numbers_left, refusal
@@ -173,7 +179,10 @@ def margins_command(
     if listed:
         for one in numbers:
             say(
-                f"{one.name}: {one.now:.4g}, tried from {one.low:.4g} to {one.high:.4g} {one.unit}".rstrip()
+                (
+                    f"{one.name}: {one.now:.4g}, tried from {one.low:.4g} to {one.high:.4g} "
+                    f"{one.unit}"
+                ).rstrip()
             )
         return 0
     goes_on = state.margining is not None and not globs and budget is None

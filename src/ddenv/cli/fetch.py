@@ -1,4 +1,6 @@
-"""Downloads the models that a world or a robot lacks, with a bar for each on the terminal: `--fetch`."""
+"""Downloads the models that a world or a robot lacks, with a bar for each on the terminal:
+`--fetch`.
+"""
 
 from __future__ import annotations
 

@@ -39,7 +39,9 @@ class Interrupted(Exception):
 def follow_to_summary(
     path: Path, engine: subprocess.Popen[bytes], as_json: bool
 ) -> tuple[int, RunState]:
-    """Prints what happens and the result, as one JSON object if asked; returns the exit code and the last state."""
+    """Prints what happens and the result, as one JSON object if asked; returns the exit code and
+    the last state.
+    """
     try:
         state = follow(path, engine, as_json)
         code = 0 if state.certified else 1
@@ -61,7 +63,8 @@ def follow_to_summary(
 
 
 def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunState:
-    """Prints what happens until the engine ends, on stderr if stdout is for JSON; returns the last state.
+    """Prints what happens until the engine ends, on stderr if stdout is for JSON; returns the last
+    state.
 
     Raises UserError and Interrupted.
     """
@@ -82,7 +85,8 @@ def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunSta
                 stop_engines([(file, engine)])
         except BrokenPipeError:
             announce(
-                f"the engine keeps working on {path}: 'ddenv open {attach_name(path)}' attaches to it, 'kill {engine.pid}' stops it"
+                f"the engine keeps working on {path}: 'ddenv open {attach_name(path)}' attaches "
+                f"to it, 'kill {engine.pid}' stops it"
             )
             raise
         state = _show(file, state, out)
@@ -99,7 +103,9 @@ def follow(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> RunSta
 
 
 def _show(file: RunFile, state: RunState, out: TextIO) -> RunState:
-    """A line for each event after `state` that matters; on a terminal, also the latest state, which is returned, below them."""
+    """A line for each event after `state` that matters; on a terminal, also the latest state, which
+    is returned, below them.
+    """
     clear = CLEAR if out.isatty() else ""
     for event, before, after in steps(file.read(state.revision), state):
         state = after

@@ -48,9 +48,11 @@ def learn_command(
     run: str | None,
     **given: Any,
 ) -> int:
-    """Lessons on delta debugging, on recorded runs: step by step, with predictions and questions. They need no Drake.
+    """Lessons on delta debugging, on recorded runs: step by step, with predictions and questions.
+    They need no Drake.
 
-    LESSON is a number, a name or a file; with a run, that run is shown step by step. 'ddenv learn' alone shows the list.
+    LESSON is a number, a name or a file; with a run, that run is shown step by step. 'ddenv learn'
+    alone shows the list.
     """
     from ddenv.learn.shelf import open_lesson, write_template
 

@@ -54,9 +54,11 @@ def runs_command() -> int:
 @click.argument("second", metavar="SCENARIO_OR_RUN", shell_complete=runs_and_scenarios)
 @json_option
 def diff_command(first: str, second: str, as_json: bool) -> int:
-    """Shows in what two runs, or two scenarios, differ: how they ended, which models are there, and their settings.
+    """Shows in what two runs, or two scenarios, differ: how they ended, which models are there, and
+    their settings.
 
-    Of a run, the models are those that are left. Models of one name that differ in place, size or friction are listed, too.
+    Of a run, the models are those that are left. Models of one name that differ in place, size or
+    friction are listed, too.
     """
     from ddenv.runs.comparison import as_recent, compared, unlike
     from ddenv.runs.subject import open_subject
@@ -106,7 +108,9 @@ def schemas_lines(columns: int | None = None) -> list[str]:
 @click.command("config")
 @click.option("--example", is_flag=True, help="Print an example file with every action.")
 def config_command(example: bool) -> int:
-    """Shows the path of the file with your keys and theme, and lists all actions with their keys."""
+    """Shows the path of the file with your keys and theme, and lists all actions with their
+    keys.
+    """
     from ddenv.workbench.config import example_lines, lines
 
     print("\n".join(example_lines() if example else lines()))
@@ -123,7 +127,8 @@ def config_command(example: bool) -> int:
 )
 @json_option
 def doctor_command(run: str | None, repair: Path | None, as_json: bool) -> int:
-    """Checks the installation, the terminal and the machine; with RUN (a name or a file) also that run.
+    """Checks the installation, the terminal and the machine; with RUN (a name or a file) also that
+    run.
 
     Exits with 1 if something is wrong.
     """

@@ -1,4 +1,6 @@
-"""What several commands share: types of values, options, and what the shell completes after a tab."""
+"""What several commands share: types of values, options, and what the shell completes after a
+tab.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ Option = Callable[[Command], Command]
 
 
 def _offering(*, runs: bool = False, scenarios: bool = False) -> Complete:
-    """Offers names of these, and files of this folder; if none of them fits, the shell looks for a path by itself."""
+    """Offers names of these, and files of this folder; if none of them fits, the shell looks for a
+    path by itself.
+    """
 
     def complete(
         context: click.Context, parameter: click.Parameter | None, begun: str
@@ -56,7 +60,9 @@ run_argument = click.argument("run", shell_complete=runs)
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in every click
-    """Comma-separated numbers of a place, m and rad, with a minimum and a maximum number of them."""
+    """Comma-separated numbers of a place, m and rad, with a minimum and a maximum number of
+    them.
+    """
 
     def __init__(self, name: str, fewest: int, most: int) -> None:
         self.name = name
@@ -114,7 +120,8 @@ def setting_options(*, only: Iterable[str] = (), without: Iterable[str] = ()) ->
                 click.option(f"{one.option}/--no-{one.option[2:]}", default=None, help=words)
             )
             continue
-        # The range is checked with the scenario, which says what else is allowed; 0 takes back a limit.
+        # The range is checked with the scenario, which says what else is allowed; 0 takes back a
+        # limit.
         kind = Whole(0) if one.none else one.kind
         shape = None if one.kind is str else "NUMBER"
         words += f" {one.more}" if one.shown == "method" else ""
@@ -189,7 +196,8 @@ reading_options = together(
         "--stand-in",
         multiple=True,
         metavar="URI=SHAPE|auto",
-        help="A shape for a missing model or mesh, such as model://barrel=cylinder:0.3,1.0, or auto: guess all that are missing; "
+        help="A shape for a missing model or mesh, such as model://barrel=cylinder:0.3,1.0, or "
+        "auto: guess all that are missing; "
         "may be repeated.",
     ),
     click.option(
@@ -202,18 +210,26 @@ reading_options = together(
         "--inside",
         is_flag=True,
         default=None,
-        help="Remove single parts of models that never move, such as the walls of a house, instead of whole models.",
+        help=(
+            "Remove single parts of models that never move, such as the walls of a house, "
+            "instead of whole models."
+        ),
     ),
     click.option(
         "--mesh",
         type=click.Choice(MESH_READINGS),
-        help="What collides in place of a mesh that is not convex: its convex pieces, or its hull.  [default: pieces]",
+        help=(
+            "What collides in place of a mesh that is not convex: its convex pieces, or its "
+            "hull.  [default: pieces]"
+        ),
     ),
 )
 
 
 def _fetching(_: Any, __: Any, is_set: bool) -> Any:
-    """What downloads the files that a world lacks, with a bar on the terminal; None if the user did not ask for it."""
+    """What downloads the files that a world lacks, with a bar on the terminal; None if the user did
+    not ask for it.
+    """
     if not is_set:
         return None
     from ddenv.cli.fetch import fetch_with_bar
@@ -226,7 +242,10 @@ fetch_option = click.option(
     "--fetch",
     is_flag=True,
     callback=_fetching,
-    help="Download models that are missing and that the world names by their address in Gazebo Fuel, into Gazebo's own cache.",
+    help=(
+        "Download models that are missing and that the world names by their address in Gazebo "
+        "Fuel, into Gazebo's own cache."
+    ),
 )
 
 

@@ -1,4 +1,6 @@
-"""Commands that start an engine and follow it without a screen: `ddenv run`, and on a run `resume` and `certify`."""
+"""Commands that start an engine and follow it without a screen: `ddenv run`, and on a run `resume`
+and `certify`.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,10 @@ LONGEST_URI = 80
 @click.option(
     "--exact",
     is_flag=True,
-    help="Reduce failing runs of the baseline themselves, each repeated with its seed, as --accept-rate exact does.",
+    help=(
+        "Reduce failing runs of the baseline themselves, each repeated with its seed, as "
+        "--accept-rate exact does."
+    ),
 )
 @click.option(
     "--protect", multiple=True, metavar="MODEL", help="A model that always stays; may be repeated."
@@ -56,7 +61,9 @@ def run_command(
     as_json: bool,
     **given: Any,
 ) -> int:
-    """Reduces SCENARIO (ditch, rubble, friction, a YAML file, an SDF world or model directives) without a screen."""
+    """Reduces SCENARIO (ditch, rubble, friction, a YAML file, an SDF world or model directives)
+    without a screen.
+    """
     from ddenv.cli.follow import follow_to_summary
     from ddenv.runs.creation import create_named
     from ddenv.runs.export import export_world
@@ -75,7 +82,10 @@ def run_command(
 def announce_notes(world: World, as_json: bool) -> None:
     """Counts the parts of a world that were replaced or ignored, if any."""
     if world.notes:
-        were = f"{count(len(world.notes), 'part')} of {world.path} {'was' if len(world.notes) == 1 else 'were'}"
+        were = (
+            f"{count(len(world.notes), 'part')} of {world.path} "
+            f"{'was' if len(world.notes) == 1 else 'were'}"
+        )
         line = f"{were} replaced or ignored; 'ddenv world check' says which and why"
         print(printable(line), file=sys.stderr if as_json else sys.stdout, flush=True)
 
@@ -113,10 +123,11 @@ def resume_command(
 ) -> int:
     """Continues RUN (a name or a file) without a screen; no finished test is repeated.
 
-    With new settings it goes on as key c of the workbench does; with another epsilon or failure all stored ends are judged again.
-    Another timeout needs --again.
+    With new settings it goes on as key c of the workbench does; with another epsilon or failure all
+    stored ends are judged again. Another timeout needs --again.
 
-    If Drake, Python or the processor has changed, the first run of the whole world is repeated and compared.
+    If Drake, Python or the processor has changed, the first run of the whole world is repeated and
+    compared.
     """
     from ddenv.cli.follow import follow_to_summary
     from ddenv.guiding.commands import Change, Situation, send
@@ -142,8 +153,10 @@ def resume_command(
         )
     if timeout is not None and not again:
         raise UserError(
-            "--timeout: with another one every run may end elsewhere, so no stored end can be judged again; "
-            f"'ddenv resume {run} --again --timeout {number_text(timeout)}' makes all tests in a new run"
+            "--timeout: with another one every run may end elsewhere, so no stored end can be "
+            "judged again; "
+            f"'ddenv resume {run} --again --timeout {number_text(timeout)}' makes all tests in a "
+            "new run"
         )
     with RunFile(path) as file:
         scenario = trusted_scenario(file, asking(trust), cluster)
@@ -154,7 +167,8 @@ def resume_command(
                     if why := change.refusal(Situation(fold(file.events()))):
                         raise UserError(why)
                     send(file, change)
-                # Going back while no engine works ends in a pause, and without a screen nobody can end it.
+                # Going back while no engine works ends in a pause, and without a screen nobody can
+                # end it.
                 if any(
                     command.kind == "go_back"
                     for command in file.commands(fold(file.events()).last_command)
@@ -190,7 +204,10 @@ def resume_command(
     "--certify-rate",
     type=float,
     metavar="PART",
-    help="Continue the last certificate, with all of its runs, until it shows that this share of the rate is kept.",
+    help=(
+        "Continue the last certificate, with all of its runs, until it shows that this share of "
+        "the rate is kept."
+    ),
 )
 @options.engine_options
 def certify_command(
@@ -202,7 +219,9 @@ def certify_command(
     trust: bool,
     as_json: bool,
 ) -> int:
-    """Certifies what is left of RUN (a name or a file) once more, with fresh seeds; it changes nothing else."""
+    """Certifies what is left of RUN (a name or a file) once more, with fresh seeds; it changes
+    nothing else.
+    """
     from ddenv.cli.follow import follow_to_summary
     from ddenv.runfile.run_settings import settings
     from ddenv.runs.programs import start_engine
@@ -213,7 +232,8 @@ def certify_command(
         raise UserError(f"--certify-rate: expected {share.wanted}, found {certify_rate}")
     if state.baseline is None:
         raise UserError(
-            f"{path}: f is not known yet, so there is nothing to certify; run it first: ddenv resume {path}"
+            f"{path}: f is not known yet, so there is nothing to certify; run it first: ddenv "
+            f"resume {path}"
         )
     if state.status != "finished" and not (state.confirming and state.ended):
         raise UserError(
@@ -225,7 +245,9 @@ def certify_command(
 
 
 def idle_run(run: str, trust: bool, cluster: str | None) -> tuple[Path, RunState]:
-    """The file and the state of a run that no engine works on, and that may start what it brings along. Raises UserError."""
+    """The file and the state of a run that no engine works on, and that may start what it brings
+    along. Raises UserError.
+    """
     from ddenv.runfile.fold import fold
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile

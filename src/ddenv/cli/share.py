@@ -1,4 +1,6 @@
-"""Commands that take a run to others: `ddenv report` and `export` write it to files, `reproduce` asks whether it still fails."""
+"""Commands that take a run to others: `ddenv report` and `export` write it to files, `reproduce`
+asks whether it still fails.
+"""
 
 from __future__ import annotations
 
@@ -57,13 +59,17 @@ def report_command(run: str, file: Path | None, force: bool) -> int:
 @click.option(
     "--passes",
     is_flag=True,
-    help="With --sdf: write the nearest world that passes, instead of what is left ('ddenv isolate RUN' finds it).",
+    help=(
+        "With --sdf: write the nearest world that passes, instead of what is left ('ddenv "
+        "isolate RUN' finds it)."
+    ),
 )
 @click.option(
     "--margin",
     multiple=True,
     metavar="NUMBER",
-    help="With --sdf: change this number, such as green_patch_01.friction, to the nearest value with which the robot reaches its "
+    help="With --sdf: change this number, such as green_patch_01.friction, to the nearest value "
+    "with which the robot reaches its "
     "goal ('ddenv margins RUN' finds it), or to that of NUMBER=VALUE; may be repeated.",
 )
 @click.option(
@@ -75,13 +81,19 @@ def report_command(run: str, file: Path | None, force: bool) -> int:
     "--bundle",
     type=Path,
     metavar="FOLDER_OR_ZIP",
-    help="Write everything needed to reproduce the failure on another machine: run, world, scenario, report, issue text, program.",
+    help=(
+        "Write everything needed to reproduce the failure on another machine: run, world, "
+        "scenario, report, issue text, program."
+    ),
 )
 @click.option(
     "--mcap",
     type=Path,
     metavar="FILE",
-    help="Write what the robot sensed and did, for Foxglove, Rerun and ros2 bag; its runs are repeated from their seeds.",
+    help=(
+        "Write what the robot sensed and did, for Foxglove, Rerun and ros2 bag; its runs are "
+        "repeated from their seeds."
+    ),
 )
 @click.option(
     "--pytest",
@@ -173,10 +185,11 @@ def _write_mcap(run: Path, file: Path, trust: bool) -> None:
 def reproduce_command(
     run: str, most: int, folder: Path | None, jobs: int, trust: bool, as_json: bool
 ) -> int:
-    """Runs what is left of RUN (a name or a file) until it is clear whether it still fails at the rate of its certificate.
+    """Runs what is left of RUN (a name or a file) until it is clear whether it still fails at the
+    rate of its certificate.
 
-    Exit codes are those of git bisect run: 1 it fails at that rate, 0 it does not (at less than half of it), 125 undecided:
-    the runs do not decide, or something is wrong.
+    Exit codes are those of git bisect run: 1 it fails at that rate, 0 it does not (at less than
+    half of it), 125 undecided: the runs do not decide, or something is wrong.
     """
     from ddenv.cli.test import line
     from ddenv.engine.single_test import expected, reproduce, subject_in

@@ -56,10 +56,12 @@ from ddenv.cli.terminal import asking
 def study_command(
     scenarios: tuple[str, ...], jobs: int, folder: Path, trust: bool, **given: Any
 ) -> int:
-    """Makes the paper's tables and figures: reduces each scenario with each pair, and writes the results.
+    """Makes the paper's tables and figures: reduces each scenario with each pair, and writes the
+    results.
 
-    It can be stopped at any time; the same command continues. Each reduction is a run in DIR/runs, for 'ddenv open'.
-    With --as-printed it follows the paper's algorithm to the letter, which needs many more tests.
+    It can be stopped at any time; the same command continues. Each reduction is a run in DIR/runs,
+    for 'ddenv open'. With --as-printed it follows the paper's algorithm to the letter, which needs
+    many more tests.
     """
     from ddenv.runs.trust import check_named
     from ddenv.study.conduct import conduct

@@ -114,7 +114,9 @@ def certificate(state: RunState) -> Data | None:
 
 
 def _whole_world(state: RunState) -> FreshRuns | None:
-    """The certificate's runs of the whole world, if it made any with all seeds of those of what is left."""
+    """The certificate's runs of the whole world, if it made any with all seeds of those of what is
+    left.
+    """
     runs = (
         each
         for each in fresh_runs(state)
@@ -132,7 +134,10 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     helps = () if found is None else helping(found)
     what = "minimal environment" if state.certified else "environment so far"
     if state.status == "finished" and not state.certified:
-        what = f"environment, {f'minimal but for {first_of(helps, 3)}' if helps else 'not shown to be minimal'}"
+        what = (
+            "environment, "
+            f"{f'minimal but for {first_of(helps, 3)}' if helps else 'not shown to be minimal'}"
+        )
     tests = ", ".join(
         f"{number} {outcome}" for outcome, number in state.outcomes().items() if number
     )
@@ -147,9 +152,13 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     # They say nothing about the failure.
     broken = [test for test in state.tests if test.broke]
     said = [
-        f"{what}: {after} of {count(before, 'model')} ({percent(1 - after / before).replace(' ', '')} smaller): {names}",
+        (
+            f"{what}: {after} of {count(before, 'model')} "
+            f"({percent(1 - after / before).replace(' ', '')} smaller): {names}"
+        ),
         *_certificate_lines(state),
-        f"{state.tests_done} tests ({tests}; {count(state.deflake_runs, 're-run')}{more}) in {count(state.rounds_done, 'round')}, "
+        f"{state.tests_done} tests ({tests}; {count(state.deflake_runs, 're-run')}{more}) in "
+        f"{count(state.rounds_done, 'round')}, "
         f"{spent(state, state.updated_at):.0f} s",
         *([off] if (off := why_off(state)) else []),
         *([known] if (known := smaller_known(state)) else []),
@@ -171,14 +180,17 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
             else f"'ddenv isolate {run}' finds a nearest world that passes, "
         )
         said.append(
-            f"next: 'ddenv open {run}' shows it{out}, 'ddenv why {run}' says why it fails, {passing}"
+            f"next: 'ddenv open {run}' shows it{out}, 'ddenv why {run}' says why it fails, "
+            f"{passing}"
             f"'ddenv export {run} --bundle {bundle}' packs it for others"
         )
     return [printable(line) for line in said]
 
 
 def _certificate_lines(state: RunState) -> list[str]:
-    """What fresh runs show; an unfinished certificate has shown something, too, which holds whenever it is stopped."""
+    """What fresh runs show; an unfinished certificate has shown something, too, which holds
+    whenever it is stopped.
+    """
     found = current(state)
     if found is None:
         rates = drift(state) or (f"f in {seen(state.nodes[0])} in the whole world",)

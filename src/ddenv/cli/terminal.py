@@ -23,10 +23,11 @@ def terminal_columns(stream: TextIO | None = None) -> int | None:
 
 
 def wrapped(text: str, columns: int | None, first: str = "") -> list[str]:
-    """`first` and `text` in lines of at most `columns`, broken between words; the lines below hang under the text, which may be
-    indented.
+    """`first` and `text` in lines of at most `columns`, broken between words; the lines below hang
+    under the text, which may be indented.
 
-    A word that is wider than a line, such as a path, comes in pieces. In one line if `columns` is None.
+    A word that is wider than a line, such as a path, comes in pieces. In one line if `columns` is
+    None.
     """
     if columns is None:
         return [first + text]
@@ -62,7 +63,9 @@ def announce(line: str) -> None:
 
 
 def asking(trust: bool) -> Callable[[str], bool]:
-    """Answers whether a program is trusted: yes with `trust`, else what the user says on a terminal, and no without one."""
+    """Answers whether a program is trusted: yes with `trust`, else what the user says on a
+    terminal, and no without one.
+    """
 
     def answer(question: str) -> bool:
         asks = sys.stdin.isatty() and sys.stderr.isatty()

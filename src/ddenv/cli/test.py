@@ -1,4 +1,6 @@
-"""`ddenv test`: runs the robot by itself, outside of a reduction, and says how often it failed in each environment."""
+"""`ddenv test`: runs the robot by itself, outside of a reduction, and says how often it failed in
+each environment.
+"""
 
 from __future__ import annotations
 
@@ -81,7 +83,9 @@ def test_command(
     as_json: bool,
     **given: Any,
 ) -> int:
-    """Runs the robot in a scenario, or in a run's world; prints each run's outcome, and at the end how often it fails."""
+    """Runs the robot in a scenario, or in a run's world; prints each run's outcome, and at the end
+    how often it fails.
+    """
     from ddenv.engine.single_test import plan, run_trials
     from ddenv.evidence.claims import current
     from ddenv.runs.export import with_margins
@@ -124,7 +128,9 @@ def test_command(
 def _subject(
     name: str, given: Mapping[str, Any], simulator: Path | None, trust: bool, robots: ExitStack
 ) -> Subject:
-    """What `name` stands for; in another simulator, if one is given. `robots` keeps the file of a robot that only a run has."""
+    """What `name` stands for; in another simulator, if one is given. `robots` keeps the file of a
+    robot that only a run has.
+    """
     from ddenv.engine.single_test import in_simulator
     from ddenv.runs.subject import open_subject, robot_file
     from ddenv.runs.trust import check_named, check_trusted
@@ -149,7 +155,10 @@ def _subject(
 def line(result: Mapping[str, Any]) -> str:
     how = result["failure"]
     if result["end_pose"] is not None:
-        how = f"ended at ({coordinates(result['end_pose'][:3])}) m after {result['simulated_seconds']:.1f} s"
+        how = (
+            f"ended at ({coordinates(result['end_pose'][:3])}) m after "
+            f"{result['simulated_seconds']:.1f} s"
+        )
         how += f"  {result['failure']}" if result["failure"] else ""
         how += "" if result["distance"] is None else f"  {result['distance']:.2f} m from f"
     without = f"  without {result['without']}" if result["without"] else ""
@@ -158,9 +167,11 @@ def line(result: Mapping[str, Any]) -> str:
 
 
 def summary(results: Sequence[Mapping[str, Any]]) -> list[Data]:
-    """For all models, then without each one that was left out: its runs that did not break, and how many of them failed.
+    """For all models, then without each one that was left out: its runs that did not break, and how
+    many of them failed.
 
-    `shown` counts the runs that ended in f, or in any failure where no f is known; `rate`, `low` and `high` are None without runs.
+    `shown` counts the runs that ended in f, or in any failure where no f is known; `rate`, `low`
+    and `high` are None without runs.
     """
     from ddenv.evidence.rates import wilson_interval
     from ddenv.runfile.state import BROKEN
@@ -211,11 +222,13 @@ def lines(rows: Sequence[Mapping[str, Any]], said: Mapping[str | None, str] = {}
 
 
 def elsewhere(results: Sequence[Mapping[str, Any]], here: Claim, simulator: str) -> list[Data]:
-    """What runs in another simulator show of what is left, of which the certificate says `here`, and of that without each model.
+    """What runs in another simulator show of what is left, of which the certificate says `here`,
+    and of that without each model.
 
-    What is left `fails` if f shows there at the certificate's rate, and not if at less than half of it. Without a model it fails if
-    f shows nearly as often as with it there, and not if the model is needed; None where the runs do not decide. `said` has the same
-    in words. An environment without a run that ended is left out.
+    What is left `fails` if f shows there at the certificate's rate, and not if at less than half of
+    it. Without a model it fails if f shows nearly as often as with it there, and not if the model
+    is needed; None where the runs do not decide. `said` has the same in words. An environment
+    without a run that ended is left out.
     """
     from ddenv.evidence.rates import shows_at
     from ddenv.runfile.state import BROKEN
@@ -243,7 +256,9 @@ def elsewhere(results: Sequence[Mapping[str, Any]], here: Claim, simulator: str)
 
 
 def _needed_there(results: Sequence[Mapping[str, Any]], without: str) -> str:
-    """What pairs of runs with the same seed show of a model, as in a certificate; "" if they do not decide."""
+    """What pairs of runs with the same seed show of a model, as in a certificate; "" if they do not
+    decide.
+    """
     from ddenv.environment import Environment
     from ddenv.evidence.certificate import ERROR, falls, settle
     from ddenv.evidence.rates import Shown

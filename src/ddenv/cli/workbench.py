@@ -42,7 +42,8 @@ PORT = 8000
 def open_command(
     before: Mapping[str, Any], /, run: str, watch: bool, lines: bool, **reading: Any
 ) -> int:
-    """Attaches the workbench to a run (its name or file), or opens it on a scenario or an SDF world.
+    """Attaches the workbench to a run (its name or file), or opens it on a scenario or an SDF
+    world.
 
     'ddenv RUN_OR_FILE' does the same; options for reading worlds may also stand before RUN_OR_FILE.
     """
@@ -86,7 +87,8 @@ def open_command(
 def _refuse_host(_: Any, __: Any, value: str | None) -> None:
     if value is not None:
         raise UserError(
-            "--host: the workbench is only served on 127.0.0.1, since anyone who can open it acts as you; "
+            "--host: the workbench is only served on 127.0.0.1, since anyone who can open it "
+            "acts as you; "
             "from another machine use ssh -L"
         )
 
@@ -105,7 +107,9 @@ def _refuse_host(_: Any, __: Any, value: str | None) -> None:
 )
 @click.option("--host", hidden=True, expose_value=False, callback=_refuse_host)
 def serve_command(run: str | None, port: int, font_size: int) -> int:
-    """Serves the workbench to browsers on this machine; with RUN (a name or a file) attached to it."""
+    """Serves the workbench to browsers on this machine; with RUN (a name or a file) attached to
+    it.
+    """
     from ddenv.workbench.terminal.served import serve
 
     serve(port, run, font_size)

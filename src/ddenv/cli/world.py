@@ -65,7 +65,9 @@ def world_command() -> None:
 
 
 def _read(file: Path, options: Data) -> tuple[World, Reading]:
-    """The world of an SDF file, or of a scenario, and how it was read by the options of `world_argument`. Raises UserError."""
+    """The world of an SDF file, or of a scenario, and how it was read by the options of
+    `world_argument`. Raises UserError.
+    """
     from ddenv.runs.subject import reading_of, with_remembered, world_of
     from ddenv.world.sdf.read import parse_world, read_world
 
@@ -180,7 +182,8 @@ def _shapes(model: Model) -> Counter[str]:
 def world_lines(world: World, columns: int | None = None) -> list[str]:
     """The table: a line for each model, then the notes by number, then the totals.
 
-    No line is wider than `columns`: first some columns go, then cells have more lines, or less words.
+    No line is wider than `columns`: first some columns go, then cells have more lines, or less
+    words.
     """
     from ddenv.world.files.floor_error import note_pieces
     from ddenv.world.placement import note_inside, note_unseen
@@ -355,7 +358,8 @@ def show(
         if spawn is not None or goal is not None or svg is not None or (took_part and passes):
             option = "--took-part" if took_part else "--passes"
             raise UserError(
-                f"{option}: --spawn, --goal, --svg and other views of a run cannot be combined with it"
+                f"{option}: --spawn, --goal, --svg and other views of a run cannot be combined "
+                "with it"
             )
         world, dim, below = _of_run(str(file), passes)
         print("\n".join([_map(world, dim=dim), *below]))
@@ -380,8 +384,9 @@ def _map(world: World, **marks: Any) -> str:
 
 
 def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
-    """The world of a run; the models that are drawn faint: what the nearest world that `passes` lacks, or what did not affect the
-    runs of the whole world; and lines that say it, the most frequent first. Raises UserError where it is not known.
+    """The world of a run; the models that are drawn faint: what the nearest world that `passes`
+    lacks, or what did not affect the runs of the whole world; and lines that say it, the most
+    frequent first. Raises UserError where it is not known.
     """
     from ddenv.evidence.slices import in_whole_world
     from ddenv.runfile.fold import fold
@@ -395,14 +400,21 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
         state = fold(run.events())
     if passes:
         gone = removed_in_passing(state, path)
-        head = f"the nearest world that passes lacks {count(len(gone), 'model')} of {len(state.elements)}:"
+        head = (
+            f"the nearest world that passes lacks {count(len(gone), 'model')} of "
+            f"{len(state.elements)}:"
+        )
         return world, frozenset(gone), [head, *(f"  {printable(model)}" for model in gone)]
     times, runs = in_whole_world(state)
     if not times or state.baseline is None:
         raise UserError(
-            f"{path}: does not record which models affected its runs of the whole world; make a new run"
+            f"{path}: does not record which models affected its runs of the whole world; make a "
+            "new run"
         )
-    head = f"{count(len(times), 'model')} of {len(state.elements)} may have affected the runs of the whole world:"
+    head = (
+        f"{count(len(times), 'model')} of {len(state.elements)} may have affected the runs of "
+        "the whole world:"
+    )
     lines = [
         f"  {printable(model)}: {number} of {count(runs, 'run')}"
         for model, number in times.most_common()
@@ -434,7 +446,9 @@ def convert(file: Path, output: Path, **reading: Any) -> int:
 @world_argument
 @click.option("-o", "--output", type=Path, required=True, help="The SDF file to write.")
 def settle(file: Path, output: Path, **reading: Any) -> int:
-    """Lets the models of FILE come to rest, and writes it with their new poses; nothing else changes."""
+    """Lets the models of FILE come to rest, and writes it with their new poses; nothing else
+    changes.
+    """
     from ddenv.robot import check_drake
 
     world, read_as = _read(file, reading)

@@ -18,7 +18,8 @@ from ddenv.text import count, padded, shortened, width
 from ddenv.world.model import World
 from ddenv.world.pose import Point
 
-# Columns for numbers and frame beside the picture, and lines above and below it: title, frame, frame, numbers.
+# Columns for numbers and frame beside the picture, and lines above and below it: title, frame,
+# frame, numbers.
 NUMBERS = 6
 AXIS = 8
 AROUND = 4
@@ -47,11 +48,12 @@ def terminal_map(
     goal: Point | None = None,
     dim: frozenset[str] = frozenset(),
 ) -> str:
-    """The world from above, without its ground: at most `rows` lines of at most `columns` characters (not less than 12 and 40).
+    """The world from above, without its ground: at most `rows` lines of at most `columns`
+    characters (not less than 12 and 40).
 
-    With `color` models are blocks of 24-bit colour; without, there is not one escape code, and models are areas of their letters.
-    `spawn` is x, y (m) and yaw (rad), `goal` x, y (m), if they should be marked; all finite. Of the models `dim` there are only
-    faint areas.
+    With `color` models are blocks of 24-bit colour; without, there is not one escape code, and
+    models are areas of their letters. `spawn` is x, y (m) and yaw (rad), `goal` x, y (m), if they
+    should be marked; all finite. Of the models `dim` there are only faint areas.
     """
     columns = max(columns, LEAST_COLUMNS)
     rows = max(rows, LEAST_ROWS)
@@ -110,7 +112,9 @@ def _view(low: np.ndarray, high: np.ndarray, columns: int, rows: int) -> View:
 
 
 def _legend(entries: Sequence[Entry], columns: int, most: int) -> list[str]:
-    """At most `most` lines below the map with as many models as fit, from top to bottom and then from left to right."""
+    """At most `most` lines below the map with as many models as fit, from top to bottom and then
+    from left to right.
+    """
     if not entries:
         return []
     widths = [max(map(width, column)) for column in zip(HEADER, *entries, strict=True)]
@@ -156,7 +160,8 @@ def _framed(canvas: Canvas, view: View, color: bool) -> Iterator[str]:
         number, corner = (down[row], "┤") if row in down else ("", "│")
         cells = "".join(map(_escaped, canvas.runs(row))) if color else canvas.text(row)
         yield f"{number[:NUMBERS]:>{NUMBERS}}{corner}{cells}│"
-    yield f"{'':>{NUMBERS}}└{''.join('┬' if column in across else '─' for column in range(view.columns))}┘"
+    axis = "".join("┬" if column in across else "─" for column in range(view.columns))
+    yield f"{'':>{NUMBERS}}└{axis}┘"
     # The numbers along x, each below its place.
     full = view.columns + AXIS
     line = [" "] * full

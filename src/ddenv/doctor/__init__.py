@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """`says` what is so about `what`; `state` is "ok", "note" (worth knowing) or "wrong"; `advice` is what to do about it."""
+    """`says` what is so about `what`; `state` is "ok", "note" (worth knowing) or "wrong"; `advice`
+    is what to do about it.
+    """
 
     group: str
     what: str

@@ -1,4 +1,6 @@
-"""Checks of one run file, and its repair into a copy. The file itself is never written, nor is anything made beside it."""
+"""Checks of one run file, and its repair into a copy. The file itself is never written, nor is
+anything made beside it.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,9 @@ def run_health(path: Path) -> list[Finding]:
 
 
 def repair(path: Path, copy: Path) -> list[Finding]:
-    """Writes all that is whole of a run to `copy`. Raises UserError if that is nothing, or if `copy` cannot be written."""
+    """Writes all that is whole of a run to `copy`. Raises UserError if that is nothing, or if
+    `copy` cannot be written.
+    """
     with _most(path) as file:
         if trouble := _parts(file):
             raise UserError(f"{path}: nothing can be repaired: {trouble}")
@@ -141,7 +145,10 @@ def _content(file: RunFile, path: Path, alive: bool) -> Iterator[Finding]:
     says = trouble or "can be read, with the scenario and the robot"
     yield _finding("world", says, "wrong" if trouble else "ok")
     if read.bare:
-        says = f"{read.bare} of {count(len(read.state.finished_tests), 'test')} have none, and cannot be shown"
+        says = (
+            f"{read.bare} of {count(len(read.state.finished_tests), 'test')} have none, and "
+            "cannot be shown"
+        )
         yield _finding("trajectories", says, "note")
     now = read.state.physics.now
     other = now and read.state.engine_version not in ("", __version__)

@@ -1,4 +1,6 @@
-"""The engine as a program. Exit codes: 0 it ended by itself, 1 it was stopped, 2 it could not go on (one line on stderr)."""
+"""The engine as a program. Exit codes: 0 it ended by itself, 1 it was stopped, 2 it could not go on
+(one line on stderr).
+"""
 
 from __future__ import annotations
 

@@ -42,20 +42,24 @@ from ddenv.runfile.store import ROBOT
 from ddenv.text import count
 from ddenv.world.scenario import seed_of
 
-# How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
+# How long to wait for a test before looking at commands again, and between two looks at the running
+# robots, s.
 WAIT = 0.05
 LIVE_PERIOD = 0.1
 # What takes longer than this shows that it is under way, s.
 PATIENCE = 1.0
-# Maximum number of broken tests in a row. If the simulator itself does not work (no licence, no display, a full disk), all tests
-# break, and the reduction would read that as "no f". In worlds that break only some tests, others end.
+# Maximum number of broken tests in a row. If the simulator itself does not work (no licence, no
+# display, a full disk), all tests break, and the reduction would read that as "no f". In worlds
+# that break only some tests, others end.
 MOST_BROKEN = 25
 
 
 class Bench:
-    """Makes tests with `pool`, as `control` allows, and records them in `journal`. `rule` judges tries of the user.
+    """Makes tests with `pool`, as `control` allows, and records them in `journal`. `rule` judges
+    tries of the user.
 
-    A test that `others` have made takes no worker. Before f is fixed, a run that failed is recorded as "failed".
+    A test that `others` have made takes no worker. Before f is fixed, a run that failed is recorded
+    as "failed".
     """
 
     def __init__(
@@ -111,7 +115,8 @@ class Bench:
         return test.environment, test.run, self._journal.is_full(test)
 
     def _make(self, wanted: Test, trial: int | None = None) -> bool | None:
-        """Starts a test, or writes its result if another one implies it; returns whether that is so, None if none may start.
+        """Starts a test, or writes its result if another one implies it; returns whether that is
+        so, None if none may start.
 
         Raises Stopped if the budget is used up and no test runs.
         """
@@ -174,7 +179,8 @@ class Bench:
         return result
 
     def check_repeats(self, mixed: bool) -> None:
-        """Makes the first baseline run again if this engine computes with anything else than the earlier ones.
+        """Makes the first baseline run again if this engine computes with anything else than the
+        earlier ones.
 
         Raises UserError if the bits differ, unless the run goes on `mixed`; and Stopped.
         """
@@ -192,14 +198,17 @@ class Bench:
                 else "gives a different trajectory"
             )
             raise UserError(
-                f"{run}: repeated, the first run of the whole world {how}: the tests were made with {state.physics.proven}, and "
-                f"this is {state.physics.now}; 'ddenv resume {run} --mixed' continues anyway, 'ddenv resume {run} --again' "
+                f"{run}: repeated, the first run of the whole world {how}: the tests were made "
+                f"with {state.physics.proven}, and "
+                f"this is {state.physics.now}; 'ddenv resume {run} --mixed' continues anyway, "
+                f"'ddenv resume {run} --again' "
                 "repeats all tests in a new run"
             )
         self._journal.record(Compared(same=result is None))
 
     def made_again(self, test: KnownTest, tells: bool = True) -> Result | None:
-        """Makes a test again, once all workers are idle; returns how it ended unless the robot's way repeats bit for bit.
+        """Makes a test again, once all workers are idle; returns how it ended unless the robot's
+        way repeats bit for bit.
 
         `tells`: views say so.
         """
@@ -224,7 +233,9 @@ class Bench:
         return None if same else result
 
     def finish_trials(self) -> None:
-        """Obeys the last commands, and makes the tests that the user asked for. Raises as `work`."""
+        """Obeys the last commands, and makes the tests that the user asked for. Raises as
+        `work`.
+        """
         self._control.poll()
         while self._control.holds or self._open_trials():
             self.tick()
@@ -235,7 +246,9 @@ class Bench:
         return [trial for trial in state.trials if not trial.verdict] if state.failures else []
 
     def _serve_trials(self) -> None:
-        """Judges tries, and starts their tests, also while the rounds are paused. Raises Stopped if the budget is used up."""
+        """Judges tries, and starts their tests, also while the rounds are paused. Raises Stopped if
+        the budget is used up.
+        """
         for trial in self._open_trials():
             environment = self._journal.state.environments[trial.environment]
             (verdict,), wanted = standing([environment], self._journal.shown, self.rule)
@@ -260,8 +273,9 @@ class Bench:
         return True
 
     def tick(self) -> None:
-        """Obeys commands, records finished tests, shows the running robots. Raises as `work`: Changed where the user has changed
-        something, since the old search must not use a test that ends now.
+        """Obeys commands, records finished tests, shows the running robots. Raises as `work`:
+        Changed where the user has changed something, since the old search must not use a test that
+        ends now.
         """
         self._look(WAIT)
 
@@ -292,7 +306,8 @@ class Bench:
             if self._broken >= MOST_BROKEN:
                 raise UserError(
                     f"{self._broken} tests in a row broke; the last one: {result.failure}; "
-                    f"fix this and continue with 'ddenv resume {self._journal.file.path}' (it repeats these tests)"
+                    f"fix this and continue with 'ddenv resume {self._journal.file.path}' (it "
+                    "repeats these tests)"
                 )
         # Before the search gets the workers that are free now.
         self._serve_trials()

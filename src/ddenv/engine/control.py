@@ -1,5 +1,5 @@
-"""Obeys what the user asks of a running engine: each command becomes an event, or a refusal with its reason. It also watches the
-disk and the clock.
+"""Obeys what the user asks of a running engine: each command becomes an event, or a refusal with
+its reason. It also watches the disk and the clock.
 """
 
 from __future__ import annotations
@@ -34,9 +34,11 @@ class Stopped(Exception):
     """The engine was asked to stop."""
 
 
-# What has to be free before a test starts, bytes: the results of tests in flight, and SQLite's log of them.
+# What has to be free before a test starts, bytes: the results of tests in flight, and SQLite's log
+# of them.
 NEEDED = 32_000_000
-# The same below the limit of a file's size: it is one result's, since the limit is there for all files.
+# The same below the limit of a file's size: it is one result's, since the limit is there for all
+# files.
 NEEDED_IN_FILE = 2_000_000
 # The time between two looks, s.
 PERIOD = 1.0
@@ -105,15 +107,17 @@ SMALL = 2.0
 
 
 def clock_offset() -> float:
-    """Unix time less that of a clock that stands still while the machine sleeps, and that nobody can set, s."""
+    """Unix time less that of a clock that stands still while the machine sleeps, and that nobody
+    can set, s.
+    """
     return time.time() - time.monotonic()
 
 
 class Control:
     """Commands turned into events and into what the driver may do next.
 
-    `terminated` is set by a signal, `after` is the number of the last command before this engine was asked to start. `attended`:
-    somebody looks at the run and can answer.
+    `terminated` is set by a signal, `after` is the number of the last command before this engine
+    was asked to start. `attended`: somebody looks at the run and can answer.
     """
 
     def __init__(
@@ -171,7 +175,9 @@ class Control:
 
     @property
     def may_search(self) -> bool:
-        """Whether a new search may begin: not while the run is paused, and not until the user has stopped making changes."""
+        """Whether a new search may begin: not while the run is paused, and not until the user has
+        stopped making changes.
+        """
         return not self._paused and time.monotonic() - self._last > SETTLE
 
     def may_start(self) -> bool:
@@ -202,12 +208,16 @@ class Control:
             self._pause()
 
     def offered(self) -> None:
-        """A note offers another way: whoever looks has time to choose it, and an unattended run goes on."""
+        """A note offers another way: whoever looks has time to choose it, and an unattended run
+        goes on.
+        """
         if self._attended and not self._paused:
             self._pause()
 
     def _obey(self, request: Request) -> None:
-        """Obeys a command exactly once, even if the engine is killed: its event holds the command's number."""
+        """Obeys a command exactly once, even if the engine is killed: its event holds the command's
+        number.
+        """
         self._journal.command = request.id
         try:
             try:

@@ -1,4 +1,6 @@
-"""Carries a run through: drives the procedure with workers and a run file, and records what it finds."""
+"""Carries a run through: drives the procedure with workers and a run file, and records what it
+finds.
+"""
 
 from __future__ import annotations
 
@@ -47,26 +49,37 @@ from ddenv.world.model import World
 from ddenv.world.placement import note_unseen
 from ddenv.world.scenario import Reduction, Scenario
 
-# Another failure competes to be f if it shows at least once where f shows so often. Rarer ones hardly ever win by luck.
+# Another failure competes to be f if it shows at least once where f shows so often. Rarer ones
+# hardly ever win by luck.
 COMPETES = 4
 # A resumed run would not repeat the rounds that it made before.
 OTHER_WAY = (
-    "round {} would now differ: the run was started with other versions of ddenv, scikit-learn or a package of schemas; "
+    "round {} would now differ: the run was started with other versions of ddenv, scikit-learn "
+    "or a package of schemas; "
     "continue with those, or start a new run"
 )
-NOT_EXACT = "runs do not repeat, so nothing exact can be said of them; keep the rate of f instead: --accept-rate kept"
-NO_MODEL = "fails without any model: look at the ground, the robot, its controller, or something that is missing"
+NOT_EXACT = (
+    "runs do not repeat, so nothing exact can be said of them; keep the rate of f instead: "
+    "--accept-rate kept"
+)
+NO_MODEL = (
+    "fails without any model: look at the ground, the robot, its controller, or something that "
+    "is missing"
+)
 # Of a rarer f no few replays say whether it still shows.
 FEWEST_REPLAYS = 3
 MOST_REPLAYS = 60
-# To reduce a single run exactly takes so many of the whole world if they are alike: one shows f, the other that it repeats.
+# To reduce a single run exactly takes so many of the whole world if they are alike: one shows f,
+# the other that it repeats.
 ENOUGH_ALIKE = 2
 LEFT_OVER = "does the simulator keep something between its runs, such as a cache or a count?"
 CHANGED = "a decision of the user ended the certificate; resume the run to continue from there"
 
 
 class Driver:
-    """One engine's work on one run. All decisions follow from the journal, so a resumed run continues in the same way."""
+    """One engine's work on one run. All decisions follow from the journal, so a resumed run
+    continues in the same way.
+    """
 
     def __init__(
         self, scenario: Scenario, world: World, journal: Journal, bench: Bench, control: Control
@@ -89,7 +102,8 @@ class Driver:
         self._evidence: Evidence
         # What the baseline shows so far, or why there is nothing to reduce.
         self._baseline: events.BaselineFinished | str = ""
-        # How many runs of what is left a new certificate needs at least; None if the search makes it when it is over.
+        # How many runs of what is left a new certificate needs at least; None if the search makes
+        # it when it is over.
         self._only_certify: int | None = None
         # The share of the rate up to which the last certificate goes on, with all its runs.
         self._certify_rate: float | None = None
@@ -128,7 +142,9 @@ class Driver:
             self._conclude()
 
     def _settle(self) -> None:
-        """Finds which models support others, once. Raises UserError if stacks are to be kept together and it cannot be found."""
+        """Finds which models support others, once. Raises UserError if stacks are to be kept
+        together and it cannot be found.
+        """
         scenario = self._scenario
         journal = self._journal
         needed = self._reduction.keep_supports
@@ -166,9 +182,11 @@ class Driver:
             raise UserError(f"reduction.keep_supports: {why}")
 
     def certify(self, at_least: int, certify_rate: float | None = None) -> None:
-        """Makes one more certificate of the current environment, and goes neither back nor on. Raises as `reduce`.
+        """Makes one more certificate of the current environment, and goes neither back nor on.
+        Raises as `reduce`.
 
-        With a `certify_rate` the last certificate goes on, with all its runs, until it shows that this share of the rate is kept.
+        With a `certify_rate` the last certificate goes on, with all its runs, until it shows that
+        this share of the rate is kept.
         """
         self._certify_rate = certify_rate
         # A search that is due would begin at the end.
@@ -185,7 +203,9 @@ class Driver:
         self._conclude()
 
     def _carry_out(self, work: steps.Work[Any]) -> Any:
-        """To the end; returns what the procedure returns. Whatever the user changes enters here, or in what it asks."""
+        """To the end; returns what the procedure returns. Whatever the user changes enters here, or
+        in what it asks.
+        """
         changed: steps.Changed | None = None
         while True:
             try:
@@ -269,7 +289,9 @@ class Driver:
         return self._leg
 
     def _check_repeats(self) -> None:
-        """Raises UserError if the first search that reduces chosen runs exactly begins, and one of them does not repeat."""
+        """Raises UserError if the first search that reduces chosen runs exactly begins, and one of
+        them does not repeat.
+        """
         journal = self._journal
         exact = exact_runs(journal.state)
         last = journal.state.leg
@@ -285,7 +307,8 @@ class Driver:
             and self._bench.made_again(test) is not None
         ):
             raise UserError(
-                f"reduction.accept_rate: exact needs runs that repeat, but run {test.run + 1} of the whole world, replayed "
+                f"reduction.accept_rate: exact needs runs that repeat, but run {test.run + 1} of "
+                "the whole world, replayed "
                 f"with seed {test.seed}, differs; keep its rate: --accept-rate kept"
             )
 
@@ -340,7 +363,9 @@ class Driver:
         return self._stacks.expand(tried_again(self._stacks.representatives, leg.again, searched))
 
     def _learn(self, tests: Iterable[int], similar: int | None) -> None:
-        """The schemas see the tests behind the verdicts of a round, and the last similar run: a resumed run sees the same."""
+        """The schemas see the tests behind the verdicts of a round, and the last similar run: a
+        resumed run sees the same.
+        """
         state = self._journal.state
         for test in (state.test(number) for number in tests):
             if not test.broke:
@@ -378,7 +403,9 @@ class Driver:
         return steps.Baseline(found.failures, competed, found.alike)
 
     def _alike(self, tests: Sequence[Test]) -> bool:
-        """Whether the robot and all that moved went the same way in these tests, to the last bit."""
+        """Whether the robot and all that moved went the same way in these tests, to the last
+        bit.
+        """
         first, *others = (self._journal.file.samples(test.id) for test in tests)
         return all(other == first for other in others)
 
@@ -500,7 +527,8 @@ class Driver:
             raise steps.Changed
 
     def _check_shows(self, round: int) -> None:
-        """Replays runs that showed f, if no test of a round did. Raises UserError if f does not show any more.
+        """Replays runs that showed f, if no test of a round did. Raises UserError if f does not
+        show any more.
 
         Only another simulator can change in the course of time.
         """
@@ -534,7 +562,9 @@ class Driver:
             self._bench.work(tests)
 
     def certificate_due(self) -> steps.Certificate:
-        """The certificate that this search has already, or a new one; a finished one only if no other is asked for."""
+        """The certificate that this search has already, or a new one; a finished one only if no
+        other is asked for.
+        """
         journal = self._journal
         last = self._journal.state.certificate
         if last is None or (self._only_certify is not None and last.claims):
@@ -604,7 +634,9 @@ class Driver:
         self._end_early_stop_if_refuted()
 
     def _end_early_stop_if_refuted(self) -> None:
-        """Ends early stop where what is left is lost, and f in tests that ended early had accepted it."""
+        """Ends early stop where what is left is lost, and f in tests that ended early had accepted
+        it.
+        """
         journal = self._journal
         certificate = self._certificate
         if certificate.claims[0].verdict != "lost" or not journal.stops_early:
@@ -615,7 +647,9 @@ class Driver:
             journal.record(events.EarlyStopEnded(certificate=certificate.number))
 
     def _elsewhere(self, tests: Numbers) -> events.EndsElsewhere | None:
-        """Whether what is left ended elsewhere in these tests than f did in the baseline, within epsilon."""
+        """Whether what is left ended elsewhere in these tests than f did in the baseline, within
+        epsilon.
+        """
         state = self._journal.state
         epsilon = spec_of(state).epsilon
         # Where another failure counts as f, the baseline says nothing of its ends.

@@ -1,4 +1,6 @@
-"""Carries isolation through with workers and a run file: finds the nearest world that passes, as `reduction.isolation` says."""
+"""Carries isolation through with workers and a run file: finds the nearest world that passes, as
+`reduction.isolation` says.
+"""
 
 from __future__ import annotations
 
@@ -28,15 +30,20 @@ FIRST_RUN = 100_000_000
 # So many fresh runs of the world that passes, at least: their interval has to say something.
 FEWEST_RUNS = 20
 VERDICTS = {"similar": "passes", "dissimilar": "fails", "unknown": "unknown"}
-CHANGED = "a decision of the user or a wrong slice ended the isolation; resume the run to continue from there"
+CHANGED = (
+    "a decision of the user or a wrong slice ended the isolation; resume the run to continue "
+    "from there"
+)
 
 
 def isolate(
     world: World, journal: Journal, bench: Bench, at_least: int | None, before: str
 ) -> None:
-    """Finds the nearest world that passes, or goes on with that; the run is finished then as it was, because of `before`.
+    """Finds the nearest world that passes, or goes on with that; the run is finished then as it
+    was, because of `before`.
 
-    The end has `at_least` fresh runs; another number than the open search has begins a new one. Raises as `Bench.work`.
+    The end has `at_least` fresh runs; another number than the open search has begins a new one.
+    Raises as `Bench.work`.
     """
     now = journal.state.isolating
     if now is None or at_least not in (None, now.asked.at_least):
@@ -69,7 +76,8 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
     rule = Passing.of(sum(test.outcome == "pass" for test in sound), len(sound))
     least = at_least or max(FEWEST_RUNS, reduction.baseline_runs)
     last = state.isolations[-1] if state.isolations else None
-    # One model of each stack that may go: first those that the reduction has left, then the nearest to f.
+    # One model of each stack that may go: first those that the reduction has left, then the nearest
+    # to f.
     evidence = Sight(world, state.elements, reduction.delta, reduction.seed).evidence(
         journal, known_failure(state).failure_test
     )
@@ -101,13 +109,17 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
 
 
 def _free(journal: Journal) -> Stacks:
-    """The stacks of the whole world that may go: none with a model that is pinned, as in the search."""
+    """The stacks of the whole world that may go: none with a model that is pinned, as in the
+    search.
+    """
     groups = map(journal.models, stacks_of(journal.state, journal.state.elements))
     return Stacks.of(group for group in groups if group.isdisjoint(journal.pinned))
 
 
 class _Isolator:
-    """Drives an isolation. All of it follows from the journal, so a resumed one comes to the same end."""
+    """Drives an isolation. All of it follows from the journal, so a resumed one comes to the same
+    end.
+    """
 
     def __init__(self, journal: Journal, bench: Bench) -> None:
         self._journal = journal
@@ -128,7 +140,9 @@ class _Isolator:
         )
 
     def carry_out(self) -> Environment | None:
-        """To the end; returns what has to go so that the robot passes. Raises as `Bench.work`, and Stopped."""
+        """To the end; returns what has to go so that the robot passes. Raises as `Bench.work`, and
+        Stopped.
+        """
         work = isolation(self, self._asked, self._known_checks())
         while True:
             _open(self._journal)
@@ -184,7 +198,8 @@ class _Isolator:
             reached = shown.count(True)
             share = reached / max(1, runs)
             low, high = (share, share) if one.exact else anytime_interval(reached, runs)
-            # With the model put back the goal is reached more rarely, but it is not shown to be missed.
+            # With the model put back the goal is reached more rarely, but it is not shown to be
+            # missed.
             verdict = "not shown" if one.claim.verdict in HELPING else one.claim.verdict
             claim = events.ReturnedMade(
                 back=one.model,

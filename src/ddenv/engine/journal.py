@@ -1,4 +1,6 @@
-"""The engine's memory: writes each event once, and finds every finished test again after a restart."""
+"""The engine's memory: writes each event once, and finds every finished test again after a
+restart.
+"""
 
 from __future__ import annotations
 
@@ -31,11 +33,13 @@ from ddenv.settings import SETTINGS, read
 
 
 class Journal:
-    """The events of a run, `state` folded from them, and a memo of its finished tests by (environment, run, full).
+    """The events of a run, `state` folded from them, and a memo of its finished tests by
+    (environment, run, full).
 
-    A test that broke is made twice, and again by the next engine where a verdict needs it. Tests that ran to their end have
-    `full` True, those that the search asked for False, most both: `early_stop` only changes runs that it cuts. What was cut
-    counts only while the same ends count as f, and early stop is used. While a user's `command` is obeyed, events hold its number.
+    A test that broke is made twice, and again by the next engine where a verdict needs it. Tests
+    that ran to their end have `full` True, those that the search asked for False, most both:
+    `early_stop` only changes runs that it cuts. What was cut counts only while the same ends count
+    as f, and early stop is used. While a user's `command` is obeyed, events hold its number.
     """
 
     def __init__(self, file: RunFile) -> None:
@@ -162,12 +166,16 @@ class Journal:
         return any(refusal.environment == environment for refusal in self.state.refused)
 
     def is_refused(self, environment: Environment) -> bool:
-        """Whether the user refused it, or it is part of what lost the rate of what counts as f now."""
+        """Whether the user refused it, or it is part of what lost the rate of what counts as f
+        now.
+        """
         lost = (lost for failures, lost in self.state.lost if failures == self.state.failures)
         return self.is_refused_by_user(environment) or any(environment <= one for one in lost)
 
     def test(self, environment: Environment, run: int, full: bool = False) -> Test | None:
-        """The finished test of a run; None if it has to be made. With `full` only a run to its end counts."""
+        """The finished test of a run; None if it has to be made. With `full` only a run to its end
+        counts.
+        """
         number = self._numbers.get(environment)
         test = None if number is None else self._tests.get((number, run, full))
         return None if test is None else self.state.test(test)
@@ -178,7 +186,9 @@ class Journal:
         return tuple(test.id for test in tests if test is not None)
 
     def full_tests(self, tests: Iterable[NumberedRun], first: int = 0) -> Numbers:
-        """The numbers of the finished full tests among these, sorted; their runs are counted from `first`."""
+        """The numbers of the finished full tests among these, sorted; their runs are counted from
+        `first`.
+        """
         return tuple(
             sorted(
                 {
@@ -227,7 +237,9 @@ class Journal:
 
     @property
     def ties(self) -> Ties | None:
-        """The ties of the run; None where no slices may be used: unwanted, unknown ties, or an audit that found a difference."""
+        """The ties of the run; None where no slices may be used: unwanted, unknown ties, or an
+        audit that found a difference.
+        """
         state = self.state
         if (
             state.ties is None
@@ -240,7 +252,9 @@ class Journal:
         return self._ties[1]
 
     def rate_of_whole(self) -> float:
-        """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
+        """The estimated rate of f in the whole world, or where a branch begins whose f is another
+        failure.
+        """
         whole = self._numbers[self.whole]
         state = self.state
         # In the runs that chose f it was lucky.
@@ -256,7 +270,8 @@ class Journal:
             and (test.phase, test.run) not in lucky
         ]
         for first in dict.fromkeys(certificate.first_run for certificate in state.certificates):
-            # A certificate runs the whole world at first only where what is left missed f: these runs would show it as too rare.
+            # A certificate runs the whole world at first only where what is left missed f: these
+            # runs would show it as too rare.
             # Those that only ran ahead of time would make it depend on the number of workers.
             for run in count(first):
                 test = self.test(self.whole, run, full=True)

@@ -1,5 +1,5 @@
-"""What the tests showed: f, fixed from runs of the whole world; each result judged by it, as plain data in which every number is
-finite; and what the schemas see of them.
+"""What the tests showed: f, fixed from runs of the whole world; each result judged by it, as plain
+data in which every number is finite; and what the schemas see of them.
 """
 
 from __future__ import annotations
@@ -33,10 +33,11 @@ FURTHER = 3
 
 
 def result_data(result: Result, failures: Sequence[Failure] = ()) -> Data:
-    """A result as the fields of `TestFinished`, with models by name, judged by f and the failures accepted as f; the nearest one
-    counts.
+    """A result as the fields of `TestFinished`, with models by name, judged by f and the failures
+    accepted as f; the nearest one counts.
 
-    Without f, a run that failed is "failed"; with it, "similar" or "other". What a run lacks is None.
+    Without f, a run that failed is "failed"; with it, "similar" or "other". What a run lacks is
+    None.
     """
     if isinstance(result, Broken):
         return {
@@ -143,7 +144,9 @@ def rows_of(file: RunFile, test: int) -> np.ndarray:
 
 
 def fixed_again(file: RunFile, state: RunState) -> BaselineFinished:
-    """The baseline by what counts as the same failure now, which judges all tests. Raises UserError if it shows none."""
+    """The baseline by what counts as the same failure now, which judges all tests. Raises UserError
+    if it shows none.
+    """
     before = known_failure(state)
     reduction = asked_of(state)
     tests = {
@@ -185,13 +188,14 @@ def fix_failure(
     chose: int = 0,
     usual: int = 0,
 ) -> BaselineFinished | str:
-    """The event that ends the baseline, or a line that says why there is no f. `tests` are in the order of runs, `trajectories`
-    those of the failing ones, by id.
+    """The event that ends the baseline, or a line that says why there is no f. `tests` are in the
+    order of runs, `trajectories` those of the failing ones, by id.
 
-    f is the failure number `wanted`, by how many runs show each; its end is that of the run which shares its failure with most
-    others. The rate counts f only; runs that broke are not in it. With `chose` so many first runs choose f, and only the others
-    give its rate; where f shows in none of these, all do. If there are more than the `usual` number of tests, what they showed
-    decided that, so the interval of the rate is one for that.
+    f is the failure number `wanted`, by how many runs show each; its end is that of the run which
+    shares its failure with most others. The rate counts f only; runs that broke are not in it. With
+    `chose` so many first runs choose f, and only the others give its rate; where f shows in none of
+    these, all do. If there are more than the `usual` number of tests, what they showed decided
+    that, so the interval of the rate is one for that.
     """
     failed = [test for test in tests if test.outcome == "failed" and test.end_pose is not None]
     failing = [test for test in failed if not chose or test.run < chose]
@@ -223,7 +227,10 @@ def fix_failure(
             for number, one in enumerate(seen, 1)
         )
         runs = sum(not test.broke for test in tests)
-        return f"there is no failure number {wanted}; {runs} runs of the whole world showed these: {listed}"
+        return (
+            f"there is no failure number {wanted}; {runs} runs of the whole world showed these: "
+            f"{listed}"
+        )
     f = groups[wanted - 1][0]
     judged = {test.id: judge_trajectory(trajectories[test.id], failures[f]) for test in failed}
     shown = {id for id, judgement in judged.items() if judgement.outcome == "similar"}
@@ -266,13 +273,17 @@ def _no_failure(tests: Sequence[Test]) -> str:
     # One that shows more often than this would have shown with a chance of 95 %.
     below = percent_at_most(1.0 - 0.05 ** (1.0 / reached))
     return (
-        f"the robot reached its goal in all {reached} baseline runs{also}: there is no failure to reduce; if there is one, it "
-        f"shows in less than {below} of all runs (95 %): --baseline-runs {FURTHER * reached} looks further"
+        f"the robot reached its goal in all {reached} baseline runs{also}: there is no failure "
+        "to reduce; if there is one, it "
+        f"shows in less than {below} of all runs (95 %): --baseline-runs {FURTHER * reached} "
+        "looks further"
     )
 
 
 def trajectory_of(rows: np.ndarray) -> np.ndarray:
-    """Rows of t (s), x, y, z (m), qw, qx, qy, qz as rows of t, x, y, z, yaw (rad): shape (N, 8) to (N, 5)."""
+    """Rows of t (s), x, y, z (m), qw, qx, qy, qz as rows of t, x, y, z, yaw (rad): shape (N, 8) to
+    (N, 5).
+    """
     return np.column_stack([rows[:, :4], headings(rows[:, 4:])])
 
 
@@ -306,7 +317,8 @@ class Sight:
             if run.end_pose is None
             else min(ends, key=lambda end: math.dist(end, end_of(run)))
         )
-        # Whether a model that affected no run was sensed depends on which of two equal runs was simulated.
+        # Whether a model that affected no run was sensed depends on which of two equal runs was
+        # simulated.
         seen = (
             set(state.elements)
             if run.took_part is None

@@ -1,7 +1,8 @@
 """What one test may take, real time and memory, and how often engines may die at once.
 
-The user's own numbers hold for all tests. Without a time, the runs of the whole world get a long one, and later tests a multiple
-of what these took; the baseline's event holds it. Without a size, the workers share most of what this process may use.
+The user's own numbers hold for all tests. Without a time, the runs of the whole world get a long
+one, and later tests a multiple of what these took; the baseline's event holds it. Without a size,
+the workers share most of what this process may use.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from ddenv.world.scenario import Scenario
 
 # What a run of the whole world may take, s.
 GENEROUS = 1800.0
-# A later test may take so many times what the slowest of them would take for all of its simulated time, and never less than this,
-# s: machines are several times slower for a while.
+# A later test may take so many times what the slowest of them would take for all of its simulated
+# time, and never less than this, s: machines are several times slower for a while.
 FACTOR = 10.0
 LEAST = 120.0
 # The part of the memory that is not left to all others: the engine, the workbench, the system.
@@ -29,7 +30,8 @@ SHARE = 0.9
 GIGABYTE = 1e9
 # So many runs of the whole world may be too late before one has ended.
 MOST_LATE = 3
-# So many engines may die in a row, each before it has got anywhere: before it wrote anything but these, among the last events.
+# So many engines may die in a row, each before it has got anywhere: before it wrote anything but
+# these, among the last events.
 MOST_DEATHS = 3
 LAST = 3000
 NOWHERE = {
@@ -40,7 +42,10 @@ NOWHERE = {
     "environment_named",
 }
 NOWHERE |= {"test_started", "test_lost"}
-HELPS = "try fewer models that can move, a shorter --timeout, another simulation.time_step in the scenario"
+HELPS = (
+    "try fewer models that can move, a shorter --timeout, another simulation.time_step in the "
+    "scenario"
+)
 
 
 def wall_limit(state: RunState) -> float:
@@ -63,7 +68,9 @@ def limit_after(state: RunState, timeout: float) -> float:
 
 
 def memory_limit(scenario: Scenario, jobs: int) -> float:
-    """What each of `jobs` workers may use with all that it starts, bytes; infinite where nothing is known of the machine."""
+    """What each of `jobs` workers may use with all that it starts, bytes; infinite where nothing is
+    known of the machine.
+    """
     asked = scenario.simulation.memory_limit
     return asked * GIGABYTE if asked is not None else SHARE * processor.usable_memory() / jobs
 
@@ -82,13 +89,16 @@ def check_crash_loop(journal: Journal) -> None:
             place = event.id
     if deaths >= MOST_DEATHS:
         raise UserError(
-            f"{path}: the last {deaths} engines died after event {place}, before a test ended; {log_of(path)} may say why; "
+            f"{path}: the last {deaths} engines died after event {place}, before a test ended; "
+            f"{log_of(path)} may say why; "
             f"'ddenv resume {path} --anyway' tries once more, perhaps with fewer --jobs"
         )
 
 
 def give_up_if_late(journal: Journal, late: str) -> None:
-    """After a test that was too `late`, in words. Raises UserError if several runs of the whole world were, and none has ended."""
+    """After a test that was too `late`, in words. Raises UserError if several runs of the whole
+    world were, and none has ended.
+    """
     state = journal.state
     if state.baseline is None and state.tests_done == state.tally["timeout"] >= MOST_LATE:
         late = f"{count(state.tally['timeout'], 'run')} of the whole world {late}"

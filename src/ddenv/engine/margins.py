@@ -1,5 +1,5 @@
-"""Finds margins with workers and a run file: tries values of numbers as `evidence.margins` asks for them. All of it follows from
-the run file, so a search that was killed comes to the same table.
+"""Finds margins with workers and a run file: tries values of numbers as `evidence.margins` asks for
+them. All of it follows from the run file, so a search that was killed comes to the same table.
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ Wanted = tuple[str, float, int]
 
 
 def numbers_left(parts: Parts, state: RunState, globs: Sequence[str]) -> list[Number]:
-    """The numbers of what is left whose names match, those that promise most first. Raises UserError."""
+    """The numbers of what is left whose names match, those that promise most first. Raises
+    UserError.
+    """
     f = state.f_position or (0.0, 0.0, 0.0)
     world = parts[1]
     kept = sorted(state.environment, key=lambda name: math.dist(center(world.model(name)), f))
@@ -55,7 +57,10 @@ def refusal(state: RunState, where: object) -> str:
         return f"its search has not finished; finish it first: ddenv resume {where}"
     left = None if certificate is None else certificate.claims[0]
     if (state.baseline.rate if left is None else left.shown / left.runs) < known.RAREST:
-        return "f shows too rarely in what is left to say where it disappears; reduce a failure that shows more often (--failure)"
+        return (
+            "f shows too rarely in what is left to say where it disappears; reduce a failure "
+            "that shows more often (--failure)"
+        )
     return "" if state.environment else "nothing is left, so there is no model with a margin"
 
 
@@ -67,7 +72,8 @@ def find_margins(
     asked: tuple[Sequence[str], int] | None,
     stood: tuple[str, str],
 ) -> None:
-    """Finds the margins of the numbers `asked` for by their globs, with at most so many runs, or goes on with the open search.
+    """Finds the margins of the numbers `asked` for by their globs, with at most so many runs, or
+    goes on with the open search.
 
     The run is then as it `stood`: its status and why. Raises Stopped, and UserError.
     """
@@ -177,7 +183,9 @@ class _Search:
                 self._record(self._running.pop(test), result)
 
     def _wanted(self) -> Iterator[Wanted]:
-        """The runs that are needed next: of one number after the other, twice, then of the nearest fix."""
+        """The runs that are needed next: of one number after the other, twice, then of the nearest
+        fix.
+        """
         while self._looks < 2 * len(self._now.wanted):
             name = self._now.wanted[self._looks % len(self._now.wanted)]
             now = self._now

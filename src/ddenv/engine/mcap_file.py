@@ -1,5 +1,5 @@
-"""Runs as an MCAP file of ROS 2 messages, made again from the seeds, bit for bit: m, s, rad, and quaternions x, y, z, w. What a
-message lacks is written as zeros, empty texts and empty lists.
+"""Runs as an MCAP file of ROS 2 messages, made again from the seeds, bit for bit: m, s, rad, and
+quaternions x, y, z, w. What a message lacks is written as zeros, empty texts and empty lists.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ Message = dict[str, Any]
 Color = tuple[float, float, float, float]
 # Topic, kind, time (s), message. Topics without a slash in front get the run's name.
 Row = tuple[str, str, float, Message]
-# All runs are in one frame, and all transforms on one topic, as tools expect; other frames begin with the run's name.
+# All runs are in one frame, and all transforms on one topic, as tools expect; other frames begin
+# with the run's name.
 MAP = "map"
 TRANSFORMS = "/tf"
 RESULT = "/result"
@@ -62,14 +63,20 @@ TRIANGLES = 11
 # The fields of messages and of their parts.
 _FIELDS = {
     TF: "geometry_msgs/TransformStamped[] transforms",
-    ODOMETRY: "std_msgs/Header header; string child_frame_id; geometry_msgs/PoseWithCovariance pose; "
-    "geometry_msgs/TwistWithCovariance twist",
-    SCAN: "std_msgs/Header header; float32 angle_min; float32 angle_max; float32 angle_increment; float32 time_increment; "
-    "float32 scan_time; float32 range_min; float32 range_max; float32[] ranges; float32[] intensities",
-    IMU: "std_msgs/Header header; geometry_msgs/Quaternion orientation; float64[9] orientation_covariance; "
+    ODOMETRY: "std_msgs/Header header; string child_frame_id; "
+    "geometry_msgs/PoseWithCovariance pose; geometry_msgs/TwistWithCovariance twist",
+    SCAN: "std_msgs/Header header; float32 angle_min; float32 angle_max; float32 angle_increment; "
+    "float32 time_increment; "
+    "float32 scan_time; float32 range_min; float32 range_max; float32[] ranges; float32[] "
+    "intensities",
+    IMU: "std_msgs/Header header; geometry_msgs/Quaternion orientation; float64[9] "
+    "orientation_covariance; "
     "geometry_msgs/Vector3 angular_velocity; float64[9] angular_velocity_covariance; "
     "geometry_msgs/Vector3 linear_acceleration; float64[9] linear_acceleration_covariance",
-    WHEELS: "std_msgs/Header header; string[] name; float64[] position; float64[] velocity; float64[] effort",
+    WHEELS: (
+        "std_msgs/Header header; string[] name; float64[] position; float64[] velocity; "
+        "float64[] effort"
+    ),
     TWIST: "std_msgs/Header header; geometry_msgs/Twist twist",
     PLACE: "std_msgs/Header header; geometry_msgs/Pose pose",
     WORDS: "string data",
@@ -85,15 +92,21 @@ _FIELDS = {
     "geometry_msgs/PoseWithCovariance": "geometry_msgs/Pose pose; float64[36] covariance",
     "geometry_msgs/Twist": "geometry_msgs/Vector3 linear; geometry_msgs/Vector3 angular",
     "geometry_msgs/TwistWithCovariance": "geometry_msgs/Twist twist; float64[36] covariance",
-    "geometry_msgs/Transform": "geometry_msgs/Vector3 translation; geometry_msgs/Quaternion rotation",
-    "geometry_msgs/TransformStamped": "std_msgs/Header header; string child_frame_id; geometry_msgs/Transform transform",
+    "geometry_msgs/Transform": "geometry_msgs/Vector3 translation; "
+    "geometry_msgs/Quaternion rotation",
+    "geometry_msgs/TransformStamped": "std_msgs/Header header; string child_frame_id; "
+    "geometry_msgs/Transform transform",
     "sensor_msgs/CompressedImage": "std_msgs/Header header; string format; uint8[] data",
     "visualization_msgs/UVCoordinate": "float32 u; float32 v",
     "visualization_msgs/MeshFile": "string filename; uint8[] data",
-    "visualization_msgs/Marker": "std_msgs/Header header; string ns; int32 id; int32 type; int32 action; geometry_msgs/Pose pose; "
-    "geometry_msgs/Vector3 scale; std_msgs/ColorRGBA color; builtin_interfaces/Duration lifetime; bool frame_locked; "
-    "geometry_msgs/Point[] points; std_msgs/ColorRGBA[] colors; string texture_resource; sensor_msgs/CompressedImage texture; "
-    "visualization_msgs/UVCoordinate[] uv_coordinates; string text; string mesh_resource; visualization_msgs/MeshFile mesh_file; "
+    "visualization_msgs/Marker": "std_msgs/Header header; string ns; int32 id; int32 type; "
+    "int32 action; geometry_msgs/Pose pose; "
+    "geometry_msgs/Vector3 scale; std_msgs/ColorRGBA color; builtin_interfaces/Duration "
+    "lifetime; bool frame_locked; "
+    "geometry_msgs/Point[] points; std_msgs/ColorRGBA[] colors; string texture_resource; "
+    "sensor_msgs/CompressedImage texture; "
+    "visualization_msgs/UVCoordinate[] uv_coordinates; string text; string mesh_resource; "
+    "visualization_msgs/MeshFile mesh_file; "
     "bool mesh_use_embedded_materials",
 }
 
@@ -125,7 +138,8 @@ class Streams:
 
 
 def write_mcap(run: Path, target: Path) -> list[str]:
-    """Makes the runs of `_chosen` again, and writes their streams to `target`; returns a line about each.
+    """Makes the runs of `_chosen` again, and writes their streams to `target`; returns a line about
+    each.
 
     Raises UserError, also for runs that give other bits here; then nothing is written.
     """
@@ -144,7 +158,8 @@ def write_mcap(run: Path, target: Path) -> list[str]:
         ]
     if not chosen:
         raise UserError(
-            f"{run}: f is not known yet, so there is no run to write; run it first: ddenv resume {run}"
+            f"{run}: f is not known yet, so there is no run to write; run it first: ddenv resume "
+            f"{run}"
         )
     template = Variants(subject.world, subject.robot, subject.scenario)
     said = []
@@ -159,7 +174,8 @@ def write_mcap(run: Path, target: Path) -> list[str]:
         # A test that ended early is written to its end.
         if not np.array_equal(result.trajectory[: len(rows)], rows):
             raise UserError(
-                f"{run}: test {test.id} gives different bits here: another Drake or processor made it"
+                f"{run}: test {test.id} gives different bits here: another Drake or processor "
+                "made it"
             )
         for topic, kind, seconds, message in messages(name, models, result, streams, subject):
             whole = topic if topic.startswith("/") else f"/{name}/{topic}"
@@ -171,8 +187,9 @@ def write_mcap(run: Path, target: Path) -> list[str]:
 
 
 def _chosen(file: RunFile, state: RunState) -> Iterator[tuple[str, int]]:
-    """Names and tests: one that shows f, the last one of what is left, and one that reaches its goal: in the nearest world that
-    passes, where it is known (then the first one has its seed), else in what is left without a model of it.
+    """Names and tests: one that shows f, the last one of what is left, and one that reaches its
+    goal: in the nearest world that passes, where it is known (then the first one has its seed),
+    else in what is left without a model of it.
     """
     passes = nearest(file, state)
     pair = None if passes is None else passes.parting

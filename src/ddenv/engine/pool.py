@@ -1,4 +1,6 @@
-"""Worker processes: each runs one test at a time, and is killed and replaced when it dies or takes too long."""
+"""Worker processes: each runs one test at a time, and is killed and replaced when it dies or takes
+too long.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,8 @@ from ddenv.runfile.store import Live
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
-# A simulated step makes a thousand small allocations: with more of them cached by glibc, a step takes 59 us, not 75.
+# A simulated step makes a thousand small allocations: with more of them cached by glibc, a step
+# takes 59 us, not 75.
 # And a worker has one core: libraries that use threads would only slow down other workers.
 FOR_DRAKE = {
     "GLIBC_TUNABLES": "glibc.malloc.tcache_count=127",
@@ -50,7 +53,9 @@ _one_at_a_time = threading.Lock()
 
 @contextmanager
 def added_to_environment(more: Mapping[str, str]) -> Iterator[None]:
-    """Adds `more` to the environment for a moment, unless the user has set it: new processes read it before any Python code."""
+    """Adds `more` to the environment for a moment, unless the user has set it: new processes read
+    it before any Python code.
+    """
     with _one_at_a_time:
         added = [name for name in more if name not in os.environ]
         os.environ.update({name: more[name] for name in added})
@@ -61,16 +66,19 @@ def added_to_environment(more: Mapping[str, str]) -> Iterator[None]:
                 del os.environ[name]
 
 
-# How often a worker may die before it takes its first task, while no test ends, before the engine gives up.
+# How often a worker may die before it takes its first task, while no test ends, before the engine
+# gives up.
 MOST_BREAKS = 3
-# How much longer than its time limit a test by a command of the user's may take, s: its worker ends the command, and says why.
+# How much longer than its time limit a test by a command of the user's may take, s: its worker ends
+# the command, and says why.
 MARGIN = 60.0
-# The maximum time of what comes before a test moves, s: large piles are rehearsed for minutes, but nothing may hang forever.
+# The maximum time of what comes before a test moves, s: large piles are rehearsed for minutes, but
+# nothing may hang forever.
 PREPARATION = 3600.0
 # The maximum time between two looks that counts, s: it is longer where the engine was stopped.
 LONGEST_LOOK = 1.0
-# How often the memory of up to `FEW` workers is looked at, s, and that of more workers as much more rarely: a look takes a third
-# of a millisecond. In this time a process fills 0.4 GB.
+# How often the memory of up to `FEW` workers is looked at, s, and that of more workers as much more
+# rarely: a look takes a third of a millisecond. In this time a process fills 0.4 GB.
 MEMORY_PERIOD = 0.2
 FEW = 8
 # The maximum time between two looks at the clocks, s.
@@ -79,7 +87,9 @@ CLOCK_PERIOD = 0.1
 
 @dataclass(frozen=True)
 class Job:
-    """A task in flight, for `test` if it is one. It may take `limit` s of real time, without its preparation."""
+    """A task in flight, for `test` if it is one. It may take `limit` s of real time, without its
+    preparation.
+    """
 
     test: int | None
     task: Task
@@ -87,7 +97,9 @@ class Job:
 
 
 class Workers(Protocol):
-    """Make tests, several at a time: processes here, or a cluster. `Pool` says what each of these does."""
+    """Make tests, several at a time: processes here, or a cluster. `Pool` says what each of these
+    does.
+    """
 
     @property
     def idle(self) -> int: ...
@@ -101,7 +113,9 @@ class Workers(Protocol):
 
 
 class _Slot:
-    """A place for one worker, and what is known of it: whether it has prepared, its job, and how often it died before that."""
+    """A place for one worker, and what is known of it: whether it has prepared, its job, and how
+    often it died before that.
+    """
 
     def __init__(self, worker: WorkerProcess) -> None:
         self.worker = worker
@@ -128,7 +142,9 @@ class _Slot:
 
 
 class Pool:
-    """`jobs` workers on one scenario, each with a pipe of its own: whoever waits for a test is woken up as it ends."""
+    """`jobs` workers on one scenario, each with a pipe of its own: whoever waits for a test is
+    woken up as it ends.
+    """
 
     def __init__(
         self,
@@ -139,8 +155,8 @@ class Pool:
         make: Make = simulator_of,
         at_a_time: int = 0,
     ) -> None:
-        """`make` makes the simulator in each worker. `at_a_time` tests share the machine's memory, `jobs` if not given. Raises
-        UserError where Drake is needed and not installed.
+        """`make` makes the simulator in each worker. `at_a_time` tests share the machine's memory,
+        `jobs` if not given. Raises UserError where Drake is needed and not installed.
         """
         self._context = multiprocessing.get_context("spawn")
         # The user's own simulator gets the environment unchanged.
@@ -194,7 +210,8 @@ class Pool:
             slot.worker.give(slot.job.task)
 
     def finished(self, seconds: float) -> list[Ended]:
-        """Tests that have ended, waiting at most `seconds` for one if one runs. Raises UserError if the world cannot be simulated.
+        """Tests that have ended, waiting at most `seconds` for one if one runs. Raises UserError if
+        the world cannot be simulated.
 
         Between two calls no more than `LONGEST_LOOK` counts as time of the tests.
         """
@@ -222,7 +239,9 @@ class Pool:
         return sorted(ended, key=lambda one: one[0])
 
     def _look(self, seconds: float) -> None:
-        """Waits at most `seconds` for an answer, output or a death. Replaces what died, kills what takes too long or too much."""
+        """Waits at most `seconds` for an answer, output or a death. Replaces what died, kills what
+        takes too long or too much.
+        """
         heard = set(
             wait([handle for slot in self._slots for handle in slot.worker.handles], seconds)
         )
@@ -244,7 +263,10 @@ class Pool:
                     most = f"{self._memory / GIGABYTE:.3g} GB of memory"
                     self._lose(
                         slot,
-                        f"used more than {most} (simulation.memory_limit, or fewer --jobs, allows more)",
+                        (
+                            f"used more than {most} (simulation.memory_limit, or fewer --jobs, "
+                            "allows more)"
+                        ),
                     )
 
     def _listen(self, slot: _Slot) -> None:
@@ -270,8 +292,8 @@ class Pool:
                 slot.result = answer
 
     def _lose(self, slot: _Slot, how: str) -> None:
-        """A worker is gone. Its job is broken, or made by another one if it had not yet begun. Raises UserError if that goes on and
-        on.
+        """A worker is gone. Its job is broken, or made by another one if it had not yet begun.
+        Raises UserError if that goes on and on.
         """
         slot.breaks += not slot.ready
         if slot.breaks > MOST_BREAKS:
@@ -280,7 +302,9 @@ class Pool:
         self._replace(slot, Broken("error", how) if slot.ready else None)
 
     def _replace(self, slot: _Slot, broken: Broken | None) -> None:
-        """A new worker for one that is gone, whose job has the result `broken`, or is made again."""
+        """A new worker for one that is gone, whose job has the result `broken`, or is made
+        again.
+        """
         slot.worker = self._worker()
         slot.ready = False
         if slot.job is None or slot.result is not None:
@@ -290,7 +314,9 @@ class Pool:
             self._hand_over(slot)
 
     def settle(self, elements: frozenset[str]) -> AskSettled:
-        """Lets an idle worker find which of `elements` rest on which. The result returns it, or None until it is known."""
+        """Lets an idle worker find which of `elements` rest on which. The result returns it, or
+        None until it is known.
+        """
         slot = self._start(Job(None, Settle(elements), PREPARATION))
 
         def found() -> Start | Broken | None:
@@ -304,7 +330,9 @@ class Pool:
         return found
 
     def live(self) -> list[tuple[Live, float]]:
-        """The running tests that have begun to move, and how long each took so far, s of real time."""
+        """The running tests that have begun to move, and how long each took so far, s of real
+        time.
+        """
         running = [
             (number, slot, slot.job.test, slot.moment)
             for number, slot in enumerate(self._slots)

@@ -16,10 +16,11 @@ Reproduce = Callable[..., "Reproduction"]
 
 @pytest.fixture
 def ddenv_reproduce(request: pytest.FixtureRequest) -> Reproduce:
-    """`ddenv_reproduce(run, folder=None, most=60, trust=False)` runs what is left of a run until it is clear whether it still
-    fails at the rate of its certificate. Paths are relative to the test's folder; `folder` has the user's own controller or
-    simulator; with `trust` it is started unasked. The result has `fails` (None: the runs do not decide), `shown`, `runs` and
-    `broken`; printed, it says the same in words. Raises UserError.
+    """`ddenv_reproduce(run, folder=None, most=60, trust=False)` runs what is left of a run until it
+    is clear whether it still fails at the rate of its certificate. Paths are relative to the test's
+    folder; `folder` has the user's own controller or simulator; with `trust` it is started unasked.
+    The result has `fails` (None: the runs do not decide), `shown`, `runs` and `broken`; printed, it
+    says the same in words. Raises UserError.
     """
 
     def reproduce(

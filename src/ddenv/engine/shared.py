@@ -1,5 +1,6 @@
-"""Reuses tests that other runs have made of the same models, with the same seed, in the same simulator: they have the same bits.
-The user's own simulators and controllers may not repeat, so their tests are not reused.
+"""Reuses tests that other runs have made of the same models, with the same seed, in the same
+simulator: they have the same bits. The user's own simulators and controllers may not repeat, so
+their tests are not reused.
 """
 
 from __future__ import annotations
@@ -40,7 +41,9 @@ class Place:
 
 
 def simulator() -> str:
-    """The versions of everything that the bits of a test may depend on: physics, noise and navigation."""
+    """The versions of everything that the bits of a test may depend on: physics, noise and
+    navigation.
+    """
     return processor.versions("drake", "numpy", "scipy")
 
 
@@ -91,8 +94,8 @@ def _tests_of(path: Path, state: RunState) -> Iterator[tuple[Key, Place]]:
 
 
 def _asked(created: Created) -> Any:
-    """The elements, and the scenario without its paths, and of how it is reduced only whether tests end early: contents of files
-    are compared.
+    """The elements, and the scenario without its paths, and of how it is reduced only whether tests
+    end early: contents of files are compared.
     """
     scenario = created.scenario
     paths = dict.fromkeys(("name", "description", "world", "folder"))

@@ -1,5 +1,5 @@
-"""Runs the robot outside of a reduction, judged against a run's f; and asks with fresh runs, as many as it takes, whether what a
-run has left still fails as it did.
+"""Runs the robot outside of a reduction, judged against a run's f; and asks with fresh runs, as
+many as it takes, whether what a run has left still fails as it did.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from ddenv.world.scenario import Oracle, seed_of
 
 @dataclass(frozen=True)
 class Trial:
-    """One run to make: the models in the world, the seed, and the model that was left out on purpose, if any. It repeats the test
-    `of` of a run.
+    """One run to make: the models in the world, the seed, and the model that was left out on
+    purpose, if any. It repeats the test `of` of a run.
     """
 
     keep: frozenset[str]
@@ -46,7 +46,9 @@ class Trial:
 
 
 def in_simulator(subject: Subject, simulator: Oracle, robot: Path) -> Subject:
-    """The same, in this simulator in place of the scenario's own; it finds the robot in the file `robot`."""
+    """The same, in this simulator in place of the scenario's own; it finds the robot in the file
+    `robot`.
+    """
     there = subject.scenario.robot.model_copy(update={"model": robot})
     return replace(
         subject, scenario=subject.scenario.model_copy(update={"oracle": simulator, "robot": there})
@@ -65,7 +67,9 @@ def plan(
     test: int | None = None,
     first_run: int = 0,
 ) -> list[Trial]:
-    """The runs asked for. Seeds are `seed`, `seed + 1`, ..., or the scenario's from `first_run` on. Raises UserError."""
+    """The runs asked for. Seeds are `seed`, `seed + 1`, ..., or the scenario's from `first_run` on.
+    Raises UserError.
+    """
     models = _models(subject, keep, minimal)
     if test is not None:
         if minimal or keep is not None or seed is not None:
@@ -116,8 +120,8 @@ def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> Names:
 
 
 def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[Data]:
-    """Makes the runs in worker processes; yields the result of each, in order, as plain data. Without f a failed run is just
-    "failed".
+    """Makes the runs in worker processes; yields the result of each, in order, as plain data.
+    Without f a failed run is just "failed".
     """
     failures: tuple[Failure, ...] = ()
     tests: dict[int, tuple[KnownTest, Floats]] = {}
@@ -164,8 +168,9 @@ MOST_BROKEN = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduction:
-    """What fresh runs showed so far: `shown` of the `runs` that did not break showed f. `fails`: f shows at the rate that the
-    certificate expects (True), or at less than half of it (False); None while that is open. `said` has it in words.
+    """What fresh runs showed so far: `shown` of the `runs` that did not break showed f. `fails`: f
+    shows at the rate that the certificate expects (True), or at less than half of it (False); None
+    while that is open. `said` has it in words.
     """
 
     fails: bool | None
@@ -179,7 +184,9 @@ class Reproduction:
 
 
 def subject_in(run: Path, folder: Path | None) -> Subject:
-    """The world of a run; the user's own controller or simulator is that in `folder`, if given. Raises UserError."""
+    """The world of a run; the user's own controller or simulator is that in `folder`, if given.
+    Raises UserError.
+    """
     with RunFile(run) as file:
         subject = read_subject(file)
     update = {} if folder is None else {"folder": folder.absolute()}
@@ -187,7 +194,9 @@ def subject_in(run: Path, folder: Path | None) -> Subject:
 
 
 def last_of(run: Path, folder: Path | None, most: int, jobs: int, trusted: bool) -> Reproduction:
-    """What all runs of `reproduce` show together. Raises UserError, also for a program that is not trusted."""
+    """What all runs of `reproduce` show together. Raises UserError, also for a program that is not
+    trusted.
+    """
     subject = subject_in(run, folder)
     if trusted and (program := untrusted(subject.scenario)):
         trust(program)
@@ -197,7 +206,9 @@ def last_of(run: Path, folder: Path | None, most: int, jobs: int, trusted: bool)
 
 
 def expected(subject: Subject, where: object) -> Certificate:
-    """The certificate of all that is left. Raises UserError where there is none, or where it showed no failure."""
+    """The certificate of all that is left. Raises UserError where there is none, or where it showed
+    no failure.
+    """
     found = None if subject.state is None else current(subject.state)
     if found is None:
         what = "no certificate says how often what is left fails"
@@ -212,9 +223,9 @@ def expected(subject: Subject, where: object) -> Certificate:
 def reproduce(
     subject: Subject, certificate: Certificate, most: int, jobs: int
 ) -> Iterator[tuple[Data, Reproduction]]:
-    """Runs what is left with fresh seeds, at most `most` times, until it is known whether f shows at the rate that its certificate
-    expects; where chosen runs were reduced, with their seeds, of which each has to show f. Yields each run's result, and what all
-    of them show together.
+    """Runs what is left with fresh seeds, at most `most` times, until it is known whether f shows
+    at the rate that its certificate expects; where chosen runs were reduced, with their seeds, of
+    which each has to show f. Yields each run's result, and what all of them show together.
     """
     shown: list[bool] = []
     broken = 0

@@ -1,5 +1,5 @@
-"""Slices in a run: the environment is cut down, without a test, to what took part in the runs known there. Some of what is implied
-is simulated all the same, and has to have the same bits.
+"""Slices in a run: the environment is cut down, without a test, to what took part in the runs known
+there. Some of what is implied is simulated all the same, and has to have the same bits.
 """
 
 from __future__ import annotations
@@ -19,14 +19,16 @@ from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runfile.supports import stacks_of
 from ddenv.settings import SETTINGS, read
 
-# All that a certificate would take as implied is simulated, while that is at most this part of all simulated time.
+# All that a certificate would take as implied is simulated, while that is at most this part of all
+# simulated time.
 CHEAP = 0.1
 
 
 def slice_environment(journal: Journal) -> bool:
-    """Cuts the environment down, with an event, where every run known there allows it; returns whether it did. Other seeds may meet
-    what went: with `accept_rate: kept` it is done after a reduction only if the chance of that is at most what may be lost of the
-    rate. In accept mode `ask` it is not done.
+    """Cuts the environment down, with an event, where every run known there allows it; returns
+    whether it did. Other seeds may meet what went: with `accept_rate: kept` it is done after a
+    reduction only if the chance of that is at most what may be lost of the rate. In accept mode
+    `ask` it is not done.
     """
     state = journal.state
     there = journal.environment
@@ -67,7 +69,9 @@ def slice_environment(journal: Journal) -> bool:
 
 
 def slice_audit(journal: Journal) -> tuple[Wanted, ...]:
-    """The last similar run, to be simulated in the slice that the environment was cut down to, if that is due and not made yet."""
+    """The last similar run, to be simulated in the slice that the environment was cut down to, if
+    that is due and not made yet.
+    """
     state = journal.state
     here = journal.state.here
     if here is None or not here.to_audit or here.evidence_test is None or state.refuted is not None:
@@ -82,8 +86,9 @@ def slice_audit(journal: Journal) -> tuple[Wanted, ...]:
 
 
 def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Environment]]:
-    """The runs known of the models `there` that decisions rest on, and what took part in each seed's; of chosen runs only those
-    that show f. None where slices may not be used, or where it is unknown what took part in one.
+    """The runs known of the models `there` that decisions rest on, and what took part in each
+    seed's; of chosen runs only those that show f. None where slices may not be used, or where it is
+    unknown what took part in one.
     """
     tests: list[Test] = []
     met: dict[int, Environment] = {}
@@ -108,7 +113,9 @@ def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Envir
 
 
 def audit_is_due(state: RunState, phase: str = "") -> bool:
-    """Whether the next implied test has to be simulated: one in `audit`; in the `phase` of a certificate each, while cheap."""
+    """Whether the next implied test has to be simulated: one in `audit`; in the `phase` of a
+    certificate each, while cheap.
+    """
     if phase == CERTIFY:
         made = [test for test in state.finished_tests if test.implied_by is None]
         audits = sum(
@@ -124,7 +131,9 @@ def audit_is_due(state: RunState, phase: str = "") -> bool:
 
 
 def compare(journal: Journal, audits: Iterable[Test]) -> None:
-    """Ends the use of slices if one of the finished `audits` differs from the run that implies it."""
+    """Ends the use of slices if one of the finished `audits` differs from the run that implies
+    it.
+    """
     state = journal.state
     wrong = next((test for test in audits if not repeats(journal, test)), None)
     if wrong is None or wrong.audits is None or state.refuted is not None:
@@ -136,7 +145,9 @@ def compare(journal: Journal, audits: Iterable[Test]) -> None:
 
 
 def repeats(journal: Journal, audit: Test) -> bool:
-    """Whether a finished audit has the bits of the run that implies it; True for one without bits, since its worker died."""
+    """Whether a finished audit has the bits of the run that implies it; True for one without bits,
+    since its worker died.
+    """
     if audit.audits is None or not (again := journal.file.motions(audit.id)):
         return True
     state = journal.state

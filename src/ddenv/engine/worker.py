@@ -1,5 +1,5 @@
-"""A worker process, from both sides: it prepares the simulator once, and then runs one test at a time. What it prints goes to the
-log.
+"""A worker process, from both sides: it prepares the simulator once, and then runs one test at a
+time. What it prints goes to the log.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ NICENESS = 5
 PERIOD = 0.1
 # The maximum length of the reason why a simulator broke, in characters.
 REASON = 400
-# How many of its last lines are kept in the reason why a worker died, and how much of a test's output the log gets, bytes.
+# How many of its last lines are kept in the reason why a worker died, and how much of a test's
+# output the log gets, bytes.
 LAST_LINES = 3
 LOGGED = 100_000
 LEFT_OUT = b"\n(the rest of what this test printed is left out)\n"
@@ -54,8 +55,9 @@ Make = Callable[[Scenario, World, Model], Simulator]
 
 @dataclass(frozen=True)
 class Start:
-    """Which models rest on which in the settled world, as (upper, lower), and how it settled. `ties` are pairs of a model and one
-    that it is tied to, without which it would move by itself. None: nothing is known without a test.
+    """Which models rest on which in the settled world, as (upper, lower), and how it settled.
+    `ties` are pairs of a model and one that it is tied to, without which it would move by itself.
+    None: nothing is known without a test.
     """
 
     supports: list[tuple[str, str]]
@@ -65,8 +67,9 @@ class Start:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """Asks for a test. With `ends` it may end early, see `Simulator.run`. `changes` have other values by name. It may take `limit`
-    s of real time, without its preparation; None for what the scenario says.
+    """Asks for a test. With `ends` it may end early, see `Simulator.run`. `changes` have other
+    values by name. It may take `limit` s of real time, without its preparation; None for what the
+    scenario says.
     """
 
     keep: frozenset[str]
@@ -78,7 +81,9 @@ class Run:
 
 @dataclass(frozen=True)
 class Settle:
-    """Asks how the world settles, and which of `elements` rest on which then. The user's own simulator cannot say."""
+    """Asks how the world settles, and which of `elements` rest on which then. The user's own
+    simulator cannot say.
+    """
 
     elements: frozenset[str]
 
@@ -93,13 +98,16 @@ class Ready:
 
 @dataclass(frozen=True)
 class Broken:
-    """A test without a result: `outcome` is "timeout" (wall clock) or "error" (its worker died, or an exception ended it)."""
+    """A test without a result: `outcome` is "timeout" (wall clock) or "error" (its worker died, or
+    an exception ended it).
+    """
 
     outcome: str
     failure: str
 
 
-# What a test ends in, beside its number where several run; and what asks whether it is known how the world settles, until it is.
+# What a test ends in, beside its number where several run; and what asks whether it is known how
+# the world settles, until it is.
 Result = RunResult | Broken
 Ended = tuple[int, Result]
 AskSettled = Callable[[], Start | Broken | None]
@@ -107,8 +115,8 @@ AskSettled = Callable[[], Start | Broken | None]
 
 @dataclass(frozen=True)
 class Moment:
-    """A test goes on: `time` s are simulated; the robot and the models that have moved are there. It began at `begun`, s of
-    `time.monotonic`.
+    """A test goes on: `time` s are simulated; the robot and the models that have moved are there.
+    It began at `begun`, s of `time.monotonic`.
     """
 
     begun: float
@@ -132,7 +140,8 @@ def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
 
 
 def work(line: Connection, output: Connection, parts: Any) -> None:
-    """Answers the tasks that come over `line`, one at a time, until it is closed; whatever is printed goes to `output`.
+    """Answers the tasks that come over `line`, one at a time, until it is closed; whatever is
+    printed goes to `output`.
 
     `parts` has what to make the simulator with, pickled in shared memory.
     """
@@ -140,14 +149,17 @@ def work(line: Connection, output: Connection, parts: Any) -> None:
     make, of = pickle.loads(bytes(parts))
     try:
         simulator: Simulator | Exception = make(*of)
-    # It is raised by every task: a worker that cannot even start would be taken for one that was killed.
+    # It is raised by every task: a worker that cannot even start would be taken for one that was
+    # killed.
     except Exception as error:
         simulator = error
     line.send(Ready())
 
     @lru_cache(maxsize=1)
     def with_changes(keep: frozenset[str], changes: Changes) -> Simulator:
-        """The simulator of a world in which numbers have other values, made anew of what it keeps."""
+        """The simulator of a world in which numbers have other values, made anew of what it
+        keeps.
+        """
         scenario, world, robot = of
         made: Simulator = make(*part_of(scenario, world, keep, dict(changes)), robot)
         return made
@@ -173,9 +185,11 @@ def work(line: Connection, output: Connection, parts: Any) -> None:
 
 def _settle_in(output: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Simulations take all cores; a screen on the same machine needs little, and a user waits for it.
+    # Simulations take all cores; a screen on the same machine needs little, and a user waits for
+    # it.
     os.nice(NICENESS)
-    # Output printed here, also by native code, must not mix with the caller's output, which programs read.
+    # Output printed here, also by native code, must not mix with the caller's output, which
+    # programs read.
     for stream in (1, 2):
         os.dup2(output.fileno(), stream)
     output.close()
@@ -193,7 +207,9 @@ def _settle_in(output: Connection) -> None:
 def answered(
     task: Task, simulator: Simulator | Exception, tell: Callable[[Moment], object]
 ) -> Answer:
-    """Does a task, and tells the moments of a test. The traceback of what nobody foresaw is printed."""
+    """Does a task, and tells the moments of a test. The traceback of what nobody foresaw is
+    printed.
+    """
     try:
         if isinstance(simulator, Exception):
             raise simulator
@@ -224,7 +240,8 @@ def _progress(tell: Callable[[Moment], object]) -> Progress:
         nonlocal begun, due, starts
         now = time.monotonic()
         if not begun or time_s == 0.0:
-            # What came before, such as rehearsals of piles, or a start in a plant that was too small, is not the test's own time.
+            # What came before, such as rehearsals of piles, or a start in a plant that was too
+            # small, is not the test's own time.
             begun = now
             due = now
             starts = models
@@ -257,7 +274,9 @@ def reason_of(error: BaseException) -> str:
 
 
 class WorkerProcess:
-    """A process that runs `work`. Answers come over one pipe, output over another; each wakes up who waits for its `handles`."""
+    """A process that runs `work`. Answers come over one pipe, output over another; each wakes up
+    who waits for its `handles`.
+    """
 
     def __init__(self, context: SpawnContext, parts: Any) -> None:
         self._line, theirs = context.Pipe()
@@ -289,7 +308,9 @@ class WorkerProcess:
             self._line.send(task)
 
     def answer(self) -> Answer | None:
-        """What it has answered since; None if nothing. Raises EOFError if it is dead and will not answer any more."""
+        """What it has answered since; None if nothing. Raises EOFError if it is dead and will not
+        answer any more.
+        """
         self._listen()
         try:
             if self._line.poll():
@@ -345,7 +366,9 @@ class WorkerProcess:
             each.close()
 
     def memory(self) -> int:
-        """The memory in use by it and by what it has started, without what they share with others, bytes; 0 if unknown."""
+        """The memory in use by it and by what it has started, without what they share with others,
+        bytes; 0 if unknown.
+        """
         used = 0
         for pid in _family(self.pid):
             with suppress(OSError, ValueError):

@@ -1,1 +1,3 @@
-"""What runs show: rates, certificates and their claims, and what a finished run implies of others."""
+"""What runs show: rates, certificates and their claims, and what a finished run implies of
+others.
+"""

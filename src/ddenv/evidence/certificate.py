@@ -1,14 +1,16 @@
-"""What fresh runs show of a result: what share of the rate of f it keeps, and how often f still shows without each model.
+"""What fresh runs show of a result: what share of the rate of f it keeps, and how often f still
+shows without each model.
 
-Fresh runs have seeds that chose nothing. Two environments are compared by pairs of runs with the same seed. For each share there
-is a bet that the first one shows f at more than this share of the second one's rate. If it does not, the bet reaches a wealth of
-1 / error with a probability of at most `error`, whenever one looks (Ville's inequality; Ramdas et al., "Game-theoretic
-statistics and safe anytime-valid inference", 2023). So the highest share whose bet has reached 1 / error is a lower bound of
-what is kept; a bet the other way gives an upper bound. Nothing is assumed about how runs with the same seed depend on each
-other.
+Fresh runs have seeds that chose nothing. Two environments are compared by pairs of runs with the
+same seed. For each share there is a bet that the first one shows f at more than this share of the
+second one's rate. If it does not, the bet reaches a wealth of 1 / error with a probability of at
+most `error`, whenever one looks (Ville's inequality; Ramdas et al., "Game-theoretic statistics and
+safe anytime-valid inference", 2023). So the highest share whose bet has reached 1 / error is a
+lower bound of what is kept; a bet the other way gives an upper bound. Nothing is assumed about how
+runs with the same seed depend on each other.
 
-A run that was not made, or broke, counts against the claim: the whole world need not run where what is left shows f, and is then
-taken to show f, too.
+A run that was not made, or broke, counts against the claim: the whole world need not run where what
+is left shows f, and is then taken to show f, too.
 """
 
 from __future__ import annotations
@@ -43,64 +45,74 @@ Verdict = Literal[
     "not shown",
     "unknown",
 ]
-# Without these models f is rarer, but not shown to be rare enough. "helps": it is shown not to be that rare.
+# Without these models f is rarer, but not shown to be rare enough. "helps": it is shown not to be
+# that rare.
 HELPING = ("helps", "rarer")
 
-# The chance that any claim of a run is wrong, over all its certificates. It is not divided by the number of models: "each model is
-# needed" is wrong only if a certain one is not, and its own bet won by chance.
+# The chance that any claim of a run is wrong, over all its certificates. It is not divided by the
+# number of models: "each model is needed" is wrong only if a certain one is not, and its own bet
+# won by chance.
 ERROR = 0.05
-# Claims come in turn: that the rate is kept, up to what has to be shown, and then those about models. If too little is kept, a
-# claim about a model comes only after that was already wrong, so this share of a certificate's error is enough for both. The rest
-# is for claims out of turn: that more of the rate is kept, or about a model while the rate is not shown to be kept.
+# Claims come in turn: that the rate is kept, up to what has to be shown, and then those about
+# models. If too little is kept, a claim about a model comes only after that was already wrong, so
+# this share of a certificate's error is enough for both. The rest is for claims out of turn: that
+# more of the rate is kept, or about a model while the rate is not shown to be kept.
 IN_TURN = 0.9
 # Without a needed model f shows in at most this share of the runs with it.
 NEEDED_SHARE = 0.8
 # At this wealth a bet against a claim ends the search for evidence.
 REFUTED = 20.0
-# In the first runs, and while what is left shows f in such a share of them, the whole world runs only where what is left missed f:
-# one more seed tells more than a run of the whole world.
+# In the first runs, and while what is left shows f in such a share of them, the whole world runs
+# only where what is left missed f: one more seed tells more than a run of the whole world.
 ALONE_SHARE = 0.7
 ALONE_FIRST = 10
-# The maximum number of pairs for what is left and for a removal. A removal is given up after some if its bets would have to grow so
-# many times as fast as they did.
+# The maximum number of pairs for what is left and for a removal. A removal is given up after some
+# if its bets would have to grow so many times as fast as they did.
 MOST_PAIRS = 300
 MOST_REMOVAL_PAIRS = 240
 FEWEST_PAIRS = 100
 HOPE = 4.0
-# Where f is shown to be rarer without a model and seems to keep so much of its rate, more than so many pairs would decide little,
-# unless the bet that it does has won such a part of what it needs.
+# Where f is shown to be rarer without a model and seems to keep so much of its rate, more than so
+# many pairs would decide little, unless the bet that it does has won such a part of what it needs.
 HELPS_AFTER = 60
 HELPS_SHARE = 0.75
 NEARLY = 0.2
-# If the runs decide nothing, a model without which f seems to keep so much of its rate is not needed.
+# If the runs decide nothing, a model without which f seems to keep so much of its rate is not
+# needed.
 ABOUT_AS_OFTEN = 0.9
-# Where f shows no more at all, a certificate ends after so many pairs; after more if f is rare, so that some would surely show it.
+# Where f shows no more at all, a certificate ends after so many pairs; after more if f is rare, so
+# that some would surely show it.
 VAIN = 30
 SURELY = 0.999
 # Where chosen runs are reduced exactly, so many others say how often f shows with other seeds.
 RUNS_BESIDE = 20
-# Where the whole world repeats to the last bit with any seed, one run shows whether what is left depends on the seed.
+# Where the whole world repeats to the last bit with any seed, one run shows whether what is left
+# depends on the seed.
 RUNS_BESIDE_ALIKE = 1
 # More broken runs of one claim than this, and than a tenth, leave it unknown.
 MOST_BROKEN = 5
-# An earlier environment is judged by a sequential test of this log-likelihood ratio, and at most so many runs.
+# An earlier environment is judged by a sequential test of this log-likelihood ratio, and at most so
+# many runs.
 ENOUGH_RATIO = 3.0
 MOST_EARLIER = 60
-# Each bet is divided among these stakes, parts of the highest possible one: most of it is where f nearly always or never shows.
+# Each bet is divided among these stakes, parts of the highest possible one: most of it is where f
+# nearly always or never shows.
 STAKES = {0.3: 0.15, 0.65: 0.25, 0.95: 0.6}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Terms:
-    """The share of the whole world's rate that a certificate has to show, the share at which the search aims, the chance of error
-    of all claims together, and the minimum number of runs of what is left.
+    """The share of the whole world's rate that a certificate has to show, the share at which the
+    search aims, the chance of error of all claims together, and the minimum number of runs of what
+    is left.
 
-    `first_rate` is what it had to show at first, if it goes on to show more: up to there claims are in turn.
-    After `vain` pairs, none of which showed f at all, it ends.
+    `first_rate` is what it had to show at first, if it goes on to show more: up to there claims are
+    in turn. After `vain` pairs, none of which showed f at all, it ends.
 
     With `order_seed` runs are made in blocks: one run of each environment with an open claim, in an
     order that this seed draws. Without seeds runs only have in common when they are made, and rates
-    may change from one run to the next. After `most_tests`, not `MOST_PAIRS`, what is open is not shown.
+    may change from one run to the next. After `most_tests`, not `MOST_PAIRS`, what is open is not
+    shown.
     """
 
     certify_rate: float
@@ -118,7 +130,9 @@ class Terms:
         return self.certify_rate if self.first_rate is None else self.first_rate
 
     def error_of_models(self, kept: float | None) -> float:
-        """The chance of error of a claim about a model where so much of the rate is shown to be kept."""
+        """The chance of error of a claim about a model where so much of the rate is shown to be
+        kept.
+        """
         return self.error * (
             IN_TURN if kept is not None and kept >= self.in_turn else 1.0 - IN_TURN
         )
@@ -130,13 +144,17 @@ def vain_after(rate: float) -> int:
 
 
 def error_of(number: int) -> float:
-    """The chance of error of certificate `number`, counted from 1; those of all certificates add up to `ERROR`."""
+    """The chance of error of certificate `number`, counted from 1; those of all certificates add up
+    to `ERROR`.
+    """
     return ERROR * 6.0 / (math.pi * number) ** 2
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """Runs of two environments with the same seeds: how many showed f in both, in the first alone, in the second alone."""
+    """Runs of two environments with the same seeds: how many showed f in both, in the first alone,
+    in the second alone.
+    """
 
     both: int = 0
     first: int = 0
@@ -151,11 +169,15 @@ class Pairs:
         )
 
     def above(self, share: float) -> float:
-        """The wealth of the bet that the first shows f at more than `share` (above 0) of the rate of the second."""
+        """The wealth of the bet that the first shows f at more than `share` (above 0) of the rate
+        of the second.
+        """
         return _wealth(self, 1.0 / share - 1.0, 1.0 / share, -1.0)
 
     def below(self, share: float) -> float:
-        """The wealth of the bet that the first shows f at less than `share` of the rate of the second."""
+        """The wealth of the bet that the first shows f at less than `share` of the rate of the
+        second.
+        """
         return _wealth(self, share - 1.0, -1.0, share)
 
     def keeps_at_least(self, error: float, known: float = 0.0) -> float:
@@ -187,7 +209,9 @@ def _wealth(pairs: Pairs, both: float, first: float, second: float) -> float:
 
 
 def _last(known: float, most: float, holds: Callable[[float], bool]) -> float:
-    """The highest number from `known` to `most` for which something holds that holds for all lower ones, to a thousandth."""
+    """The highest number from `known` to `most` for which something holds that holds for all lower
+    ones, to a thousandth.
+    """
     if not holds(known + 0.001 * (most - known)):
         return known
     while most - known > 0.001:
@@ -202,8 +226,8 @@ NumberedRun = tuple[Environment, int]
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a procedure asks for: these `tests`, as (environment, run); `later` environments will run with later seeds, if at all.
-    `bound` is what its tests have shown so far.
+    """What a procedure asks for: these `tests`, as (environment, run); `later` environments will
+    run with later seeds, if at all. `bound` is what its tests have shown so far.
     """
 
     tests: tuple[NumberedRun, ...]
@@ -211,14 +235,16 @@ class Wanted:
     bound: float | None = None
 
 
-# Asks for tests, is sent whether each showed f or broke, and returns a verdict with the bound that was shown.
+# Asks for tests, is sent whether each showed f or broke, and returns a verdict with the bound that
+# was shown.
 Procedure = Generator[Wanted, tuple[Shown, ...], tuple[Verdict, float | None]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """A verdict, "" while it is open, and the `bound` shown so far, that rest on tests, as (environment, run). `wanted` are the
-    tests that it needs next, `later` those that it may need after these. `broken` of its tests broke.
+    """A verdict, "" while it is open, and the `bound` shown so far, that rest on tests, as
+    (environment, run). `wanted` are the tests that it needs next, `later` those that it may need
+    after these. `broken` of its tests broke.
     """
 
     verdict: Verdict
@@ -230,7 +256,9 @@ class Claim:
 
 
 class Settling:
-    """A procedure that is carried as far as the finished runs go. What it claims follows from their outcomes in order alone."""
+    """A procedure that is carried as far as the finished runs go. What it claims follows from their
+    outcomes in order alone.
+    """
 
     def __init__(self, procedure: Procedure) -> None:
         # Every procedure asks for a run.
@@ -241,7 +269,9 @@ class Settling:
         self._settled: Claim | None = None
 
     def claim(self, shown: ShownIn, ahead: int = 1) -> Claim:
-        """What it claims by now. Looks `ahead` for so many runs of each environment, so that idle workers have something to do."""
+        """What it claims by now. Looks `ahead` for so many runs of each environment, so that idle
+        workers have something to do.
+        """
         while self._settled is None:
             wanted = self._wanted
             known = tuple(shown(*test) for test in wanted.tests)
@@ -290,14 +320,16 @@ def settle(procedure: Procedure, shown: ShownIn, ahead: int = 1) -> Claim:
 
 
 def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
-    """What share of the rate of `whole` is kept by `left`: "kept" if at least `certify_rate` is, "lost", or "not shown".
+    """What share of the rate of `whole` is kept by `left`: "kept" if at least `certify_rate` is,
+    "lost", or "not shown".
 
-    "kept" is wrong with a probability of at most the terms' error; "lost", less than `keep_rate` is kept, of at most 1 /
-    `REFUTED`.
+    "kept" is wrong with a probability of at most the terms' error; "lost", less than `keep_rate` is
+    kept, of at most 1 / `REFUTED`.
     """
     if left == whole:
         return (yield from _shows(whole, terms))
-    # `assumed` takes f to show in the whole world where that did not run; `sound` takes it not to show there.
+    # `assumed` takes f to show in the whole world where that did not run; `sound` takes it not to
+    # show there.
     assumed = Pairs()
     sound = Pairs()
     bound = 0.0
@@ -358,11 +390,13 @@ def falls(
     share: float = NEEDED_SHARE,
     first: int = 0,
 ) -> Procedure:
-    """How often f shows in `without`, as a part of its rate in `left`; "needed" if at most `share`. Runs begin at `first`.
+    """How often f shows in `without`, as a part of its rate in `left`; "needed" if at most `share`.
+    Runs begin at `first`.
 
-    "needed" is wrong with a probability of at most `error`. "rarer": f is rarer than in `left`; "helps": that, and more
-    frequent than `share`, each wrong in at most 1 / `REFUTED` of the cases. "not needed": it seems to show about as often; that
-    has no error, and the next certificate has to show it.
+    "needed" is wrong with a probability of at most `error`. "rarer": f is rarer than in `left`;
+    "helps": that, and more frequent than `share`, each wrong in at most 1 / `REFUTED` of the cases.
+    "not needed": it seems to show about as often; that has no error, and the next certificate has
+    to show it.
     """
     assumed = Pairs()
     sound = Pairs()
@@ -405,7 +439,9 @@ def often(environment: Environment, runs: int) -> Procedure:
 
 
 def good_enough(earlier: Environment, rate: float, keep_rate: float, lost_rate: float) -> Procedure:
-    """Whether an earlier environment is shown to have lost the `rate` of f, being nearer to `lost_rate`: "lost", else "kept"."""
+    """Whether an earlier environment is shown to have lost the `rate` of f, being nearer to
+    `lost_rate`: "lost", else "kept".
+    """
     good = min(rate, HIGHEST_RATE)
     bad = min(max(0.02, min(keep_rate * good, (good + lost_rate) / 2.0)), keep_rate * good)
     ratio = 0.0
@@ -437,11 +473,12 @@ EIGHT_OF_TEN = 1.28
 def certificate_tests(
     rate: float, certify_rate: float, left: int, at_least: int, seen: int = 0
 ) -> Expected:
-    """Tests of a certificate of `left` needed models, as (low, likely, high): about seven of ten or more take
-    between low and high, if f never shows without one of these models.
+    """Tests of a certificate of `left` needed models, as (low, likely, high): about seven of ten or
+    more take between low and high, if f never shows without one of these models.
 
-    Where f is rare, and the same seeds show it, most take fewer. Where f still shows without a model, most take more.
-    `rate` is the whole world's. It was `seen` in so many runs and may be another one; with 0 it is known.
+    Where f is rare, and the same seeds show it, most take fewer. Where f still shows without a
+    model, most take more. `rate` is the whole world's. It was `seen` in so many runs and may be
+    another one; with 0 it is known.
     """
     # A damaged run file may ask for nothing, or for all.
     rate = min(max(rate, 0.0), 1.0)
@@ -455,7 +492,9 @@ def certificate_tests(
 
 
 def _factors(ends: Sequence[float]) -> Interval:
-    """It takes one of `ends` tests by what may be the rates, the first one probably: how many times fewer or more it may take."""
+    """It takes one of `ends` tests by what may be the rates, the first one probably: how many times
+    fewer or more it may take.
+    """
     # What is not known of the rates and chance within the certificate are independent factors.
     shorter = math.exp(math.hypot(math.log(SHORTER), math.log(min(ends) / ends[0])))
     return shorter, math.exp(math.hypot(math.log(LONGER), math.log(max(ends) / ends[0])))
@@ -464,9 +503,11 @@ def _factors(ends: Sequence[float]) -> Interval:
 def certificate_from_here(
     made: int, left_runs: int, open_pairs: Sequence[int], seen: Pairs, runs: int
 ) -> Expected:
-    """The same once removals have shown something: `made` tests so far, `left_runs` of them of what is left.
+    """The same once removals have shown something: `made` tests so far, `left_runs` of them of what
+    is left.
 
-    Each claim about a model that is not decided has so many `open_pairs`. `runs` pairs of all removals were as `seen`.
+    Each claim about a model that is not decided has so many `open_pairs`. `runs` pairs of all
+    removals were as `seen`.
     """
     with_it = (seen.both + seen.second) / runs
     second = max(seen.second, 0.5) / runs
@@ -494,9 +535,11 @@ def _removal_pairs(both: float, first: float, second: float) -> float:
 
 
 def _expected(rate: float, certify_rate: float, left: int, at_least: int) -> float:
-    """Its tests where the whole world and what is left show f at `rate`, and that without any of its models never.
+    """Its tests where the whole world and what is left show f at `rate`, and that without any of
+    its models never.
 
-    As `ddenv.evidence.certificate` goes, where the wealth of each bet grows as fast as its fastest stake on average.
+    As `ddenv.evidence.certificate` goes, where the wealth of each bet grows as fast as its fastest
+    stake on average.
     """
     kept = (1.0 / certify_rate - 1.0, 1.0 / certify_rate, -1.0)
     both = ALIKE * rate + (1.0 - ALIKE) * rate * rate
@@ -516,7 +559,9 @@ def _expected(rate: float, certify_rate: float, left: int, at_least: int) -> flo
 
 
 def tests_in_blocks(rate: float, certify_rate: float, left: int) -> int:
-    """How many tests a certificate without seeds takes on average, where without any of `left` models f never shows."""
+    """How many tests a certificate without seeds takes on average, where without any of `left`
+    models f never shows.
+    """
     both = rate * rate
     blocks = _until(
         NEEDS,
@@ -530,7 +575,9 @@ def tests_in_blocks(rate: float, certify_rate: float, left: int) -> int:
 def _until(
     wealth: float, shares: tuple[float, float, float], gains: tuple[float, float, float]
 ) -> float:
-    """After how many pairs a bet has this wealth, on average. `shares` of all pairs have these `gains`."""
+    """After how many pairs a bet has this wealth, on average. `shares` of all pairs have these
+    `gains`.
+    """
     pairs = tuple(zip(shares, gains, strict=True))
     growths = {
         stake: sum(share * math.log1p(stake * gain) for share, gain in pairs) for stake in STAKES

@@ -31,12 +31,15 @@ from ddenv.runfile.state import BROKEN, CERTIFY, OUTCOMES, RunState, Test
 from ddenv.runfile.supports import stack_with, stacks_of
 from ddenv.text import Names, percent_at_least, percent_at_most
 
-# After so many pairs without a model, what a certificate still takes is forecast from what it has seen.
+# After so many pairs without a model, what a certificate still takes is forecast from what it has
+# seen.
 PAIRS_THAT_SHOW = 10
 
 
 def is_minimal(certificate: Certificate) -> bool:
-    """Whether a certificate shows that what is left keeps the rate of the same failure, and that each model in it is needed."""
+    """Whether a certificate shows that what is left keeps the rate of the same failure, and that
+    each model in it is needed.
+    """
     claims = certificate.claims
     kept = bool(claims) and (claims[0].verdict == "kept" or bool(certificate.seeds))
     return (
@@ -47,7 +50,9 @@ def is_minimal(certificate: Certificate) -> bool:
 
 
 def helping(certificate: Certificate) -> Names:
-    """The models but for which a certificate shows the end to be minimal; the one without which f shows most often comes first."""
+    """The models but for which a certificate shows the end to be minimal; the one without which f
+    shows most often comes first.
+    """
     left, *removals = certificate.claims
     helps = [claim for claim in removals if claim.verdict != "needed"]
     if left.verdict != "kept" or not all(claim.verdict in HELPING for claim in helps):
@@ -76,8 +81,8 @@ def terms_of(state: RunState, certificate: Certificate) -> Terms:
 
 
 def so_far(state: RunState, certificate: Certificate) -> dict[str | None, Settled]:
-    """What the runs of a certificate have shown by now, by the model that they leave out; None is what is left. Models that no run
-    has left out yet are missing.
+    """What the runs of a certificate have shown by now, by the model that they leave out; None is
+    what is left. Models that no run has left out yet are missing.
     """
     node = state.nodes[certificate.node]
     whole = state.environments[origin(state, certificate.node).id]
@@ -122,7 +127,9 @@ def _finished(state: RunState, certificate: Certificate) -> list[Test]:
 
 
 def never_left_out(state: RunState, certificate: Certificate) -> int:
-    """How many models of a finished certificate's environment no run leaves out: those that were pinned, with their stacks."""
+    """How many models of a finished certificate's environment no run leaves out: those that were
+    pinned, with their stacks.
+    """
     there = state.nodes[certificate.node].environment
     gone = {
         name for claim in certificate.claims for name in stack_with(state, there, claim.without)
@@ -131,21 +138,25 @@ def never_left_out(state: RunState, certificate: Certificate) -> int:
 
 
 def is_nearest(one: Isolation) -> bool:
-    """Whether fresh runs show that a world passes, and that it does not with any one model put back."""
+    """Whether fresh runs show that a world passes, and that it does not with any one model put
+    back.
+    """
     return one.found is not None and all(
         claim.verdict in ("passes", "needed") for claim in one.checks[-1].claims
     )
 
 
 def current(state: RunState) -> Certificate | None:
-    """The last finished certificate of the current environment, if there is one; a later one may not be finished."""
+    """The last finished certificate of the current environment, if there is one; a later one may
+    not be finished.
+    """
     here = (one for one in reversed(state.certificates) if one.node == state.node and not one.past)
     return next((one for one in here if one.claims), None)
 
 
 def runs_behind(state: RunState, certificate: Certificate, claim: Claim) -> tuple[Test, ...]:
-    """The sound runs of a claim's environment that the certificate rests on (the chosen ones, if seeds were), not those made ahead
-    of time.
+    """The sound runs of a claim's environment that the certificate rests on (the chosen ones, if
+    seeds were), not those made ahead of time.
     """
     if certificate.seeds:
         chosen = exact_runs(state)
@@ -163,8 +174,8 @@ def runs_behind(state: RunState, certificate: Certificate, claim: Claim) -> tupl
 
 @dataclass(frozen=True, slots=True)
 class Instead:
-    """Another failure than f: a key of `DEEDS`, the number of runs, and how far from f's end they ended, m: median and maximum; NaN
-    where no distance is known.
+    """Another failure than f: a key of `DEEDS`, the number of runs, and how far from f's end they
+    ended, m: median and maximum; NaN where no distance is known.
     """
 
     failure: str
@@ -174,7 +185,9 @@ class Instead:
 
 
 def failing_instead(state: RunState, certificate: Certificate, claim: Claim) -> Instead | None:
-    """What the robot does without a model that is needed, where it mostly fails otherwise and does not reach its goal."""
+    """What the robot does without a model that is needed, where it mostly fails otherwise and does
+    not reach its goal.
+    """
     if claim.verdict != "needed" or claim.without is None:
         return None
     runs = [test for test in runs_behind(state, certificate, claim) if not test.shows_f]
@@ -228,7 +241,9 @@ def expected_fresh_runs(state: RunState, now: Certificate) -> Expected:
 
 
 def has_dropped(state: RunState) -> bool:
-    """Whether the runs of the current environment so far show that f is rarer in it than it may be."""
+    """Whether the runs of the current environment so far show that f is rarer in it than it may
+    be.
+    """
     here = state.here
     if here is None or settings(state).accept_rate == "exact":
         return False
@@ -243,11 +258,12 @@ def has_dropped(state: RunState) -> bool:
 class FreshRuns:
     """Runs with fresh seeds of the environment of `node`, or of that without the model `without`.
 
-    `shown` of the `runs` that ended and did not break showed f; `outcomes` has the number of each outcome. `low`..`high` is the
-    95 % interval of the rate, 0..1 without runs. `running` are the tests that run now. `claim` is what the finished certificate
-    says of them. What is left keeps at least `bound` of the rate, by the runs so far; without the model f shows at most `bound`
-    times as often. `is_left`: all that is left ran. `is_chosen`: the whole world ran only where what is left missed f, so these
-    runs say nothing about its rate.
+    `shown` of the `runs` that ended and did not break showed f; `outcomes` has the number of each
+    outcome. `low`..`high` is the 95 % interval of the rate, 0..1 without runs. `running` are the
+    tests that run now. `claim` is what the finished certificate says of them. What is left keeps at
+    least `bound` of the rate, by the runs so far; without the model f shows at most `bound` times
+    as often. `is_left`: all that is left ran. `is_chosen`: the whole world ran only where what is
+    left missed f, so these runs say nothing about its rate.
     """
 
     node: int
@@ -265,7 +281,9 @@ class FreshRuns:
 
     @property
     def shows_at_least(self) -> str:
-        """That "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing is shown yet."""
+        """That "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing
+        is shown yet.
+        """
         if self.bound is None or (self.bound >= 1.0 if self.without else self.bound <= 0.0):
             return ""
         return (
@@ -285,7 +303,9 @@ class FreshRuns:
 
 
 def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
-    """The runs of the current environment's certificate: what is left comes first, the world that f was seen in last."""
+    """The runs of the current environment's certificate: what is left comes first, the world that f
+    was seen in last.
+    """
     certificate = state.certificate
     if certificate is None:
         return ()
@@ -293,7 +313,8 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
     for test in (each for each in state.confirm_tests if each.run >= certificate.first_run):
         tests.setdefault((test.node, test.without), []).append(test)
     claims = {claim.without: claim for claim in certificate.claims}
-    # Stacks that are kept together are named by their first models. Where the rate is lost, nothing is claimed of removals.
+    # Stacks that are kept together are named by their first models. Where the rate is lost, nothing
+    # is claimed of removals.
     free = (
         stack[0] for stack in stacks_of(state, state.environment) if state.pinned.isdisjoint(stack)
     )

@@ -1,4 +1,6 @@
-"""Where runs that failed ended: whether their ends form groups, scatter around one place, or lie elsewhere than other ones."""
+"""Where runs that failed ended: whether their ends form groups, scatter around one place, or lie
+elsewhere than other ones.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +16,13 @@ from ddenv.environment import Numbers
 from ddenv.runfile.events import EndsElsewhere, Place
 from ddenv.runfile.state import RunState, Test
 
-# Groups of ends are so many times farther apart than each is wide: a cloud of ends hardly ever falls apart like that by chance.
+# Groups of ends are so many times farther apart than each is wide: a cloud of ends hardly ever
+# falls apart like that by chance.
 APART = 3.0
 # Nearer than this part of epsilon, groups are noise.
 NEAR = 0.25
-# With fewer ends nothing is said; more of them take too long. Of fewer than `FEW` ends nobody knows how wide their group is.
+# With fewer ends nothing is said; more of them take too long. Of fewer than `FEW` ends nobody knows
+# how wide their group is.
 FEWEST = 5
 MOST = 100
 FEW = 2
@@ -41,7 +45,9 @@ def of_baseline(state: RunState) -> list[Test]:
 
 @dataclass(frozen=True)
 class Groups:
-    """Ends in groups, by their places in a list, the largest group first; no two groups are nearer than `apart`, m."""
+    """Ends in groups, by their places in a list, the largest group first; no two groups are nearer
+    than `apart`, m.
+    """
 
     groups: tuple[Numbers, ...]
     apart: float
@@ -74,7 +80,9 @@ def groups_of(ends: Sequence[Place], epsilon: float) -> Groups | None:
 
 
 def one_place(ends: Sequence[Place], epsilon: float) -> float | None:
-    """How far the others are from one of these ends at most, m, where they scatter around it by more than epsilon."""
+    """How far the others are from one of these ends at most, m, where they scatter around it by
+    more than epsilon.
+    """
     ends = ends[:MOST]
     if len(ends) < FEWEST or groups_of(ends, epsilon):
         return None
@@ -83,7 +91,9 @@ def one_place(ends: Sequence[Place], epsilon: float) -> float | None:
 
 
 def joining(reach: float) -> float:
-    """An epsilon that joins ends which scatter by so much, m: a little more, since other runs may end a little farther off."""
+    """An epsilon that joins ends which scatter by so much, m: a little more, since other runs may
+    end a little farther off.
+    """
     more = 1.1 * reach
     step = 10.0 ** -max(1, -math.floor(math.log10(more)))
     return float(f"{math.ceil(more / step - 1e-9) * step:.3g}")
@@ -92,7 +102,8 @@ def joining(reach: float) -> float:
 def elsewhere(
     whole: Sequence[Place], left: Sequence[Place], epsilon: float
 ) -> EndsElsewhere | None:
-    """Where the runs of the whole world often ended with f, and those of what is left hardly do; None if there is no such place.
+    """Where the runs of the whole world often ended with f, and those of what is left hardly do;
+    None if there is no such place.
 
     For each group of all these ends the exact test of Fisher compares how many of both are in it.
     """

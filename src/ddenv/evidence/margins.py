@@ -1,7 +1,9 @@
-"""What runs with one number changed show: whether f still shows at a value, what a number's values add up to, and which is tried
-next: outward from the present one by growing steps, then by halves between values with other verdicts.
+"""What runs with one number changed show: whether f still shows at a value, what a number's values
+add up to, and which is tried next: outward from the present one by growing steps, then by halves
+between values with other verdicts.
 
-Nothing is assumed between the values that were tried, or beyond them. All follows from what is known of the values.
+Nothing is assumed between the values that were tried, or beyond them. All follows from what is
+known of the values.
 """
 
 from __future__ import annotations
@@ -18,30 +20,35 @@ from ddenv.runfile.progress import Margins
 from ddenv.runfile.state import BROKEN
 from ddenv.text import Names
 
-# "f" still shows, the robot reaches its "goal" instead, "other" things happen; "undecided" after the most runs that a value gets,
-# "impossible" in the world, "" while it is open.
+# "f" still shows, the robot reaches its "goal" instead, "other" things happen; "undecided" after
+# the most runs that a value gets, "impossible" in the world, "" while it is open.
 Verdict = Literal["f", "goal", "other", "undecided", "impossible", ""]
-# f still shows at `SHOWS` of its rate rather than at `GONE` of it; the robot reaches its goal at the rate `REACHED`, not `MISSED`.
+# f still shows at `SHOWS` of its rate rather than at `GONE` of it; the robot reaches its goal at
+# the rate `REACHED`, not `MISSED`.
 SHOWS = 0.9
 GONE = 0.1
 REACHED = 0.9
 MISSED = 0.25
 # The chance that any claim of a call is wrong is at most this.
 ERROR = 0.05
-# The maximum number of runs of a value, of a number, and of that in a first look where several share a budget.
+# The maximum number of runs of a value, of a number, and of that in a first look where several
+# share a budget.
 MOST_RUNS = 16
 MOST_OF_NUMBER = 120
 FIRST_LOOK = 32
 # Where f shows more rarely than this in what is left, no few runs say where it is gone.
 RAREST = 0.25
-# So many fresh runs judge each of so many fixes, from this run on: far from those of a reduction, its certificates and isolations.
+# So many fresh runs judge each of so many fixes, from this run on: far from those of a reduction,
+# its certificates and isolations.
 FIX_RUNS = 20
 MOST_FIXES = 3
 FIRST_FIX_RUN = 500_000_000
-# Values are tried outward from the present one by growing steps: so many to the end of the range, the first as a share of it.
+# Values are tried outward from the present one by growing steps: so many to the end of the range,
+# the first as a share of it.
 STEPS = 3
 FIRST_SHARE = 1.0 / 16.0
-# The values between the nearest one at which the goal is reached and the end of the range, as parts of the way.
+# The values between the nearest one at which the goal is reached and the end of the range, as parts
+# of the way.
 BEYOND = (1.0 / 3.0, 2.0 / 3.0)
 # A limit is known well enough within this share of its distance from the present value.
 NEAR = 0.1
@@ -49,13 +56,17 @@ NEAR = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Wald's sequential tests of a value, where f shows at `rate` at the present one: wrong with a chance of at most `error`."""
+    """Wald's sequential tests of a value, where f shows at `rate` at the present one: wrong with a
+    chance of at most `error`.
+    """
 
     rate: float
     error: float
 
     def verdict(self, outcomes: Sequence[str]) -> Verdict:
-        """What the outcomes of runs 0, 1, ... show; "" while they do not decide. Runs beyond the decision do not change it."""
+        """What the outcomes of runs 0, 1, ... show; "" while they do not decide. Runs beyond the
+        decision do not change it.
+        """
         f = goal = sound = 0
         shows: bool | None = None
         reached: bool | None = None
@@ -90,7 +101,9 @@ class Rule:
 
 
 def error_each(rate: float, runs: int) -> float:
-    """The error of each verdict, so that all that so many runs can give are right with a probability of at least 1 - `ERROR`."""
+    """The error of each verdict, so that all that so many runs can give are right with a
+    probability of at least 1 - `ERROR`.
+    """
     fewest = 1
     while Rule(rate, ERROR / max(1, runs // (fewest + 1))).surely_needed(()) > fewest:
         fewest += 1
@@ -99,7 +112,9 @@ def error_each(rate: float, runs: int) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What is known of a number's values: the outcomes of runs 0, 1, ..., how each failed, and why some are not possible."""
+    """What is known of a number's values: the outcomes of runs 0, 1, ..., how each failed, and why
+    some are not possible.
+    """
 
     outcomes: Mapping[float, Sequence[str]] = field(default_factory=dict)
     failures: Mapping[float, Sequence[str]] = field(default_factory=dict)
@@ -126,7 +141,9 @@ class Known:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Value:
-    """A value that was tried, with the outcomes of its runs in their order and how each failed, or `why` it is not possible."""
+    """A value that was tried, with the outcomes of its runs in their order and how each failed, or
+    `why` it is not possible.
+    """
 
     value: float
     verdict: Verdict
@@ -137,11 +154,13 @@ class Value:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Side:
-    """The values tried above (`up`) or below the present one, the nearest first; `end` is where the range ends.
+    """The values tried above (`up`) or below the present one, the nearest first; `end` is where the
+    range ends.
 
-    `until`: the farthest up to which f shows at all values that were decided; None: the present one. `gone`: the nearest at which
-    it does not show, or which is not possible. `goal`: the nearest at which the robot reaches its goal. `to_end`: it does at all
-    values `beyond` it as well. `again`: the farthest at which f shows beyond `gone`.
+    `until`: the farthest up to which f shows at all values that were decided; None: the present
+    one. `gone`: the nearest at which it does not show, or which is not possible. `goal`: the
+    nearest at which the robot reaches its goal. `to_end`: it does at all values `beyond` it as
+    well. `again`: the farthest at which f shows beyond `gone`.
     """
 
     up: bool
@@ -201,7 +220,9 @@ def _side(asked: NumberAsked, up: bool, tried: Sequence[Value]) -> Side:
 
 
 def known_of(margins: Margins, name: str) -> Known:
-    """What the runs of the search show of a number; a value's runs count up to the first that is not finished."""
+    """What the runs of the search show of a number; a value's runs count up to the first that is
+    not finished.
+    """
     runs: dict[float, dict[int, tuple[str, str]]] = {}
     for one in margins.runs:
         if one.name == name and one.run < FIRST_FIX_RUN:
@@ -218,7 +239,9 @@ def known_of(margins: Margins, name: str) -> Known:
 
 
 def margins_of(margins: Margins) -> tuple[Margin, ...]:
-    """The margins of all numbers with a value that was tried, in the order in which they were asked for."""
+    """The margins of all numbers with a value that was tried, in the order in which they were asked
+    for.
+    """
     rules = ((one.asked, Rule(one.rate, one.error)) for one in margins.numbers)
     found = (margin_of(asked, rule, known_of(margins, asked.name)) for asked, rule in rules)
     return tuple(one for one in found if one.up.tried or one.down.tried)
@@ -226,10 +249,11 @@ def margins_of(margins: Margins) -> tuple[Margin, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fix:
-    """A changed number with which the robot reaches its goal, by runs of the search; `share` of the number's scale it is changed.
+    """A changed number with which the robot reaches its goal, by runs of the search; `share` of the
+    number's scale it is changed.
 
-    Of `runs` fresh runs it `reached` its goal in so many; `confirmed` says whether they show it, None while they are not all
-    made.
+    Of `runs` fresh runs it `reached` its goal in so many; `confirmed` says whether they show it,
+    None while they are not all made.
     """
 
     name: str
@@ -274,8 +298,9 @@ def fixes_of(margins: Margins) -> tuple[Fix, ...]:
 
 
 def pairs_of(margins: Margins) -> tuple[NumberAsked, ...]:
-    """Two numbers to change together where no change of one was found to lead to the goal: the two with the nearest values at
-    which something else happens than f, each towards the end of its range.
+    """Two numbers to change together where no change of one was found to lead to the goal: the two
+    with the nearest values at which something else happens than f, each towards the end of its
+    range.
     """
     one_sided = [
         (one.asked, side, side.gone)
@@ -322,7 +347,9 @@ def changes_at(asked: NumberAsked, value: float) -> tuple[tuple[str, float], ...
 
 
 def steps(asked: NumberAsked, up: bool) -> tuple[float, ...]:
-    """The values outward from the present one to the end of the range; none if that is no farther than the resolution."""
+    """The values outward from the present one to the end of the range; none if that is no farther
+    than the resolution.
+    """
     reach = asked.high - asked.now if up else asked.now - asked.low
     if reach <= 0.0:
         return ()
@@ -347,8 +374,8 @@ def _at(asked: NumberAsked, up: bool, distance: float, digits: int = 2) -> float
 
 
 def beyond(asked: NumberAsked, up: bool, value: float) -> tuple[float, ...]:
-    """Where the goal has to be reached, too, so that it is said to be reached from `value` on: at the end of the range, and at two
-    values between.
+    """Where the goal has to be reached, too, so that it is said to be reached from `value` on: at
+    the end of the range, and at two values between.
     """
     end = asked.high if up else asked.low
     distance = abs(value - asked.now)
@@ -359,7 +386,9 @@ def beyond(asked: NumberAsked, up: bool, value: float) -> tuple[float, ...]:
 
 
 def next_value(asked: NumberAsked, up: bool, tried: Collection[Value]) -> float | None:
-    """The next value to try on one side, after those `tried` there, of which one may be open; None if enough is known."""
+    """The next value to try on one side, after those `tried` there, of which one may be open; None
+    if enough is known.
+    """
     by_value = {one.value: one for one in tried}
     if (open_one := next((one.value for one in tried if not one.verdict), None)) is not None:
         return open_one
@@ -369,7 +398,8 @@ def next_value(asked: NumberAsked, up: bool, tried: Collection[Value]) -> float 
         if by_value[value].verdict in ("goal", "impossible"):
             break
     near = sorted(tried, key=lambda one: abs(one.value - asked.now))
-    # Between the nearest one where f is gone, or where the goal is reached, and the one before it, until that is near enough.
+    # Between the nearest one where f is gone, or where the goal is reached, and the one before it,
+    # until that is near enough.
     for limit in (("goal", "other", "impossible"), ("goal",)):
         place = next((place for place, one in enumerate(near) if one.verdict in limit), None)
         if place is None or (place and near[place - 1].verdict == "undecided"):
@@ -396,7 +426,9 @@ def next_value(asked: NumberAsked, up: bool, tried: Collection[Value]) -> float 
 def wanted(
     asked: NumberAsked, rule: Rule, known: Known, most: int = MOST_OF_NUMBER
 ) -> Iterator[tuple[float, int]]:
-    """The runs that are surely needed next, as (value, run), with at most `most` runs in all; none when the search is over."""
+    """The runs that are surely needed next, as (value, run), with at most `most` runs in all; none
+    when the search is over.
+    """
     sides = margin_of(asked, rule, known).sides
     lengths = [len(steps(asked, side.up)) for side in sides]
     for side, length in zip(sides, lengths, strict=True):
@@ -405,8 +437,9 @@ def wanted(
             continue
         made = known.outcomes.get(value, ())
         more = rule.surely_needed(made)
-        # Each side has its part, so that no race of tests decides which one gets the last runs. Where they may run out before this
-        # value is decided, one run after the other says whether more are needed.
+        # Each side has its part, so that no race of tests decides which one gets the last runs.
+        # Where they may run out before this value is decided, one run after the other says whether
+        # more are needed.
         left = most * length // sum(lengths) - sum(len(one.outcomes) for one in side.tried)
         if more <= left:
             yield from (

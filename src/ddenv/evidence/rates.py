@@ -11,7 +11,8 @@ from ddenv.environment import Environment
 Z_95 = 1.959963984540054
 # Few runs never show that f is certain.
 HIGHEST_RATE = 0.985
-# The rate of f where something that it needs is missing: another failure may end in the same place by chance.
+# The rate of f where something that it needs is missing: another failure may end in the same place
+# by chance.
 SPURIOUS = 0.03
 # Whether a run showed f. A broken one says nothing; None is a run that is not finished.
 Shown = bool | Literal["broken"] | None
@@ -22,8 +23,8 @@ Interval = tuple[float, float]
 
 
 def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> Interval:
-    """The Wilson interval of a rate seen `successes` times in `trials`, of 95 % or so many standard deviations. Raises ValueError
-    for impossible counts.
+    """The Wilson interval of a rate seen `successes` times in `trials`, of 95 % or so many standard
+    deviations. Raises ValueError for impossible counts.
     """
     if trials < 1 or not 0 <= successes <= trials:
         raise ValueError(f"{successes} of {trials}")
@@ -40,11 +41,11 @@ def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> In
 
 
 def anytime_interval(successes: int, trials: int, error: float = 0.05) -> Interval:
-    """An interval of a rate that misses it with a probability of at most `error`, however it is decided when to stop; 0 to 1
-    without runs.
+    """An interval of a rate that misses it with a probability of at most `error`, however it is
+    decided when to stop; 0 to 1 without runs.
 
-    Jeffreys' mixture of Betas against each rate (Robbins, "Statistical methods related to the law of the iterated logarithm",
-    1970).
+    Jeffreys' mixture of Betas against each rate (Robbins, "Statistical methods related to the law
+    of the iterated logarithm", 1970).
     """
     misses = trials - successes
     mixed = (
@@ -78,17 +79,20 @@ def miss_chance(rate: float, iterations: int) -> float:
 
 
 def iterations_needed(rate: float, confidence: float = 0.95) -> int:
-    """The fewest iterations with which a failure that shows at `rate` (above 0) is seen with probability `confidence`."""
+    """The fewest iterations with which a failure that shows at `rate` (above 0) is seen with
+    probability `confidence`.
+    """
     if rate >= 1.0:
         return 0
     return max(0, math.ceil(math.log(1.0 - confidence) / math.log(1.0 - rate) - 1e-9) - 1)
 
 
 def shows_at(outcomes: Iterable[bool], rate: float, error: float = 0.01) -> bool | None:
-    """Whether runs show a failure at `rate` (above 0) rather than at half of it: True, False, or None while they do not decide.
+    """Whether runs show a failure at `rate` (above 0) rather than at half of it: True, False, or
+    None while they do not decide.
 
-    Wald's sequential test ("Sequential tests of statistical hypotheses", 1945): wrong with a probability of at most about
-    `error`.
+    Wald's sequential test ("Sequential tests of statistical hypotheses", 1945): wrong with a
+    probability of at most about `error`.
     """
     runs = hits = 0
     for shown in outcomes:
@@ -101,8 +105,8 @@ def shows_at(outcomes: Iterable[bool], rate: float, error: float = 0.01) -> bool
 
 
 def leans_to(hits: int, misses: int, rate: float, other: float, error: float) -> bool | None:
-    """The same after `hits` and `misses`: whether they speak for `rate` or for `other`, a lower one. Rates above 0.99, or 0.97 for
-    `other`, are taken as these: no few runs tell them apart.
+    """The same after `hits` and `misses`: whether they speak for `rate` or for `other`, a lower
+    one. Rates above 0.99, or 0.97 for `other`, are taken as these: no few runs tell them apart.
     """
     rate = min(rate, 0.99)
     other = min(other, 0.97)

@@ -1,15 +1,19 @@
 """Slices: what is known of a run because nothing that it lacks took part in another one.
 
-Tests share their seeds, and a simulation repeats bit for bit where what took no part in it is removed. So a finished run of models
-E1 implies the run of E2 with the same seed if E2 is a part of E1, has all that took part, and breaks no tie. It implies nothing
-for other seeds. In programs this is dynamic slicing.
+Tests share their seeds, and a simulation repeats bit for bit where what took no part in it is
+removed. So a finished run of models E1 implies the run of E2 with the same seed if E2 is a part of
+E1, has all that took part, and breaks no tie. It implies nothing for other seeds. In programs this
+is dynamic slicing.
 
 Who uses this keeps to three rules, so that neither workers nor kills change a result:
 
-- An implied test has the outcome that a simulation would have. So verdicts, which follow from the outcomes of tests in their order,
+- An implied test has the outcome that a simulation would have. So verdicts, which follow from the
+  outcomes of tests in their order,
   are the same whichever tests are implied.
-- An environment is cut down to its slice by the runs that decisions rest on, and by no run that only ran ahead of time.
-- That a slice was taken, or found to be wrong, is an event. What follows from it follows from the event.
+- An environment is cut down to its slice by the runs that decisions rest on, and by no run that
+only ran ahead of time.
+- That a slice was taken, or found to be wrong, is an event. What follows from it follows from the
+event.
 """
 
 from __future__ import annotations
@@ -25,7 +29,8 @@ from ddenv.runfile.state import CERTIFY, ISOLATE, RunState
 
 @dataclass(frozen=True)
 class Ties:
-    """What each model is tied to: without one of these it would move by itself, so without a test it stays with them, or goes.
+    """What each model is tied to: without one of these it would move by itself, so without a test
+    it stays with them, or goes.
 
     `of` has these models by number; `on` has, by number, the models that are tied to each.
     """
@@ -73,8 +78,8 @@ def implies(took_part: Environment, there: Environment, keep: Environment, ties:
 
 
 def fresh_chance(met: Sequence[Environment]) -> float:
-    """About the chance that a fresh run meets a model that none of these runs `met`: the share of them that met one which no other
-    met (leaving each out in turn; after Good, 1953).
+    """About the chance that a fresh run meets a model that none of these runs `met`: the share of
+    them that met one which no other met (leaving each out in turn; after Good, 1953).
     """
     once = NOTHING
     more = NOTHING
@@ -88,7 +93,9 @@ def fresh_chance(met: Sequence[Environment]) -> float:
 
 
 def in_whole_world(state: RunState) -> tuple[Counter[str], int]:
-    """In how many of the baseline runs each model took part, empty where that is unknown; and how many runs these are."""
+    """In how many of the baseline runs each model took part, empty where that is unknown; and how
+    many runs these are.
+    """
     runs = [test for test in state.tests if test.phase == "baseline" and not test.broke]
     return Counter(
         name for test in runs for name in (test.took_part or NOTHING).names(state.elements)
@@ -101,7 +108,9 @@ def in_last(state: RunState) -> Environment | None:
 
 
 def met_by(state: RunState, node: Node) -> list[Environment]:
-    """What took part in each of the runs by which the environment of a node was cut down to its slice, by seed."""
+    """What took part in each of the runs by which the environment of a node was cut down to its
+    slice, by seed.
+    """
     met: dict[int, Environment] = {}
     for number in node.sliced_by:
         test = state.test(number)
@@ -110,6 +119,8 @@ def met_by(state: RunState, node: Node) -> list[Environment]:
 
 
 def simulated(state: RunState) -> int:
-    """How many tests of the search were simulated, the baseline included, certificates and isolation apart."""
+    """How many tests of the search were simulated, the baseline included, certificates and
+    isolation apart.
+    """
     made = (test for test in state.tests if test.is_finished and test.implied_by is None)
     return sum(test.phase not in (CERTIFY, ISOLATE) for test in made)

@@ -1,5 +1,6 @@
-"""The commands: for each, when it is possible (`refusal`), its words, and its form in the run file's table `command`: its kind with
-its fields as JSON, as in `veto {"round": 2, "candidate": 3}`. Models are numbers into the run's elements.
+"""The commands: for each, when it is possible (`refusal`), its words, and its form in the run
+file's table `command`: its kind with its fields as JSON, as in `veto {"round": 2, "candidate": 3}`.
+Models are numbers into the run's elements.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ NO_MODELS = "no such models"
 class Situation:
     """A run, and what else decides whether a command is possible.
 
-    `barred` is why this viewer cannot guide the run at all, or "". `pending` is the viewer's last command in brief until
-    the engine obeys it, or "".
+    `barred` is why this viewer cannot guide the run at all, or "". `pending` is the viewer's last
+    command in brief until the engine obeys it, or "".
     """
 
     state: RunState
@@ -70,7 +71,9 @@ class Situation:
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """A command in words: `brief` while it waits for its answer, `said` when it is sent, `question` before that, or ""."""
+    """A command in words: `brief` while it waits for its answer, `said` when it is sent, `question`
+    before that, or "".
+    """
 
     brief: str
     said: str = ""
@@ -120,7 +123,10 @@ def new_search(state: RunState, size: int | None = None) -> str:
     """
     if state.baseline is None:
         return "The search begins with that"
-    return f"A new search begins from {count(len(state.environment) if size is None else size, 'model')}"
+    return (
+        "A new search begins from "
+        f"{count(len(state.environment) if size is None else size, 'model')}"
+    )
 
 
 def named(names: Iterable[str]) -> str:
@@ -194,7 +200,8 @@ class StartEngine(Asked):
 
 
 class Isolate(Asked):
-    """Start an engine that finds the nearest world that passes, or goes on with that. It is not a command, as `StartEngine`.
+    """Start an engine that finds the nearest world that passes, or goes on with that. It is not a
+    command, as `StartEngine`.
 
     `again`: search also if that world is known.
     """
@@ -210,12 +217,17 @@ class Isolate(Asked):
         if now.engine != "absent":
             return "an engine is working on the run; let it end first"
         if state.isolated is not None and state.isolating is None and not self.again:
-            return "a nearest world that passes is known: W shows it; 'ddenv isolate RUN --again' searches again"
+            return (
+                "a nearest world that passes is known: W shows it; 'ddenv isolate RUN --again' "
+                "searches again"
+            )
         return ""
 
 
 class Undo(Asked):
-    """Take back the last reduction, or the last accepted failure; the same reduction is not made again."""
+    """Take back the last reduction, or the last accepted failure; the same reduction is not made
+    again.
+    """
 
     def refusal(self, now: Situation) -> str:
         here = now.state.here
@@ -229,7 +241,10 @@ class Undo(Asked):
             return Words("undo")
         after = len(state.nodes[here.parent].environment)
         said = f"{here.what} is taken back. {new_search(state, after)}"
-        again = f"It will not reduce to these {len(here.environment)} again, in any branch, unless you allow it"
+        again = (
+            f"It will not reduce to these {len(here.environment)} again, in any branch, unless "
+            "you allow it"
+        )
         return Words("undo", f"{said}. {again}: v on their row, or h and enter on #{here.number}")
 
 
@@ -249,7 +264,8 @@ class GoBack(Asked):
     def words(self, state: RunState) -> Words:
         there = place(state.nodes[self.node])
         question = (
-            f"Go on from {there}?\n\nThe run pauses there. Change settings (c), pin (p) or try (w, o); then press space to go on. "
+            f"Go on from {there}?\n\nThe run pauses there. Change settings (c), pin (p) or try "
+            "(w, o); then press space to go on. "
             "Later results stay in the history, and you can come back to them. No test is repeated."
         )
         return Words(
@@ -260,8 +276,8 @@ class GoBack(Asked):
 
 
 class Change(Asked):
-    """Go on with other settings; all names are in `CHANGEABLE`. With one of `JUDGES` all ends are judged again, and a new search
-    begins from the whole world.
+    """Go on with other settings; all names are in `CHANGEABLE`. With one of `JUDGES` all ends are
+    judged again, and a new search begins from the whole world.
     """
 
     settings: Data
@@ -285,7 +301,10 @@ class Change(Asked):
             and failure > len(baseline.seen)
             and "epsilon" not in new
         ):
-            return f"failure: the whole world showed {count(len(baseline.seen), 'failure')}; choose one of these"
+            return (
+                f"failure: the whole world showed {count(len(baseline.seen), 'failure')}; choose "
+                "one of these"
+            )
         return "" if new else "these are the settings already"
 
     def words(self, state: RunState) -> Words:
@@ -298,7 +317,9 @@ class Change(Asked):
         return Words("change settings", f"from now on: {words}{then}")
 
     def begins_anew(self, state: RunState) -> bool:
-        """Whether a new search begins: the budget alone changes nothing in the order of the tests."""
+        """Whether a new search begins: the budget alone changes nothing in the order of the
+        tests.
+        """
         return not set(self.new(state)) <= {"budget"}
 
     def new(self, state: RunState) -> dict[str, Value]:
@@ -415,7 +436,10 @@ class Veto(OfCandidate):
     def words(self, state: RunState) -> Words:
         return Words(
             "veto",
-            f"{self.label(state)} is vetoed: it will not be tried in any round; v again undoes that",
+            (
+                f"{self.label(state)} is vetoed: it will not be tried in any round; v again undoes "
+                "that"
+            ),
         )
 
 
@@ -459,7 +483,10 @@ class Pin(Asked):
         if not names:
             return NO_MODELS
         if gone := [name for name in names if name not in kept]:
-            return f"{named(gone[:1])} is removed already: go back (h) to an environment that has it, then pin it"
+            return (
+                f"{named(gone[:1])} is removed already: go back (h) to an environment that has "
+                "it, then pin it"
+            )
         return "" if self.new(now.state) else "pinned already"
 
     def words(self, state: RunState) -> Words:
@@ -559,7 +586,9 @@ class Adopt(Asked):
 
 
 class LeaveOut(Asked):
-    """Make what is left without a model that only helps the environment, by the runs of the certificate."""
+    """Make what is left without a model that only helps the environment, by the runs of the
+    certificate.
+    """
 
     model: int
 
@@ -627,18 +656,24 @@ class AcceptOther(Asked):
             what = f"test {test.id}"
             said = f"a branch reduces the failure of test {test.id}, from {models} on"
             then = (
-                "Reduce this failure instead of f? The run branches: these models become the environment, and only this failure "
-                "counts as f in the branch. Going back in the history (h) restores f and everything found for it."
+                "Reduce this failure instead of f? The run branches: these models become the "
+                "environment, and only this failure "
+                "counts as f in the branch. Going back in the history (h) restores f and "
+                "everything found for it."
             )
         else:
             brief = "count another failure as f"
             what = printable(label)
             said = f"the other failure of {label} counts as f, too"
-            then = "Count this failure as f, too? Then these models become the environment. u takes it back."
+            then = (
+                "Count this failure as f, too? Then these models become the environment. u takes "
+                "it back."
+            )
         near = test.distance is not None and math.isfinite(test.distance)
         apart = f", {test.distance:.2f} m from f's end" if near else ""
         question = (
-            f"In {what} ({models}) the robot {deed(test.failure)} at {_position(test.end_pose)}{apart}."
+            f"In {what} ({models}) the robot {deed(test.failure)} at "
+            f"{_position(test.end_pose)}{apart}."
             f"\nIn f it {deed(state.failure)} at {_position(state.f_position)}.\n\n{then}"
         )
         return Words(brief, said, question)
@@ -658,7 +693,8 @@ Command = (
 KINDS: dict[str, type[Command]] = {snake_case(each.__name__): each for each in get_args(Command)}
 # The run goes on from these: an engine starts for them if none is running.
 GOES_ON = (Try, Adopt, LeaveOut, AcceptOther, Undo, GoBack, Change)
-# After these a new search begins: a certificate that is being made is broken off, a reduction that waits is dropped.
+# After these a new search begins: a certificate that is being made is broken off, a reduction that
+# waits is dropped.
 ANEW = (Pin, Unpin, Adopt, AcceptOther, Undo, GoBack)
 
 
@@ -668,7 +704,9 @@ def refusal(command: Command | StartEngine | Isolate, now: Situation) -> str:
 
 
 def starts_engine(command: Command, state: RunState) -> bool:
-    """Whether an engine starts for a command if none is running. Other pins restart a finished search."""
+    """Whether an engine starts for a command if none is running. Other pins restart a finished
+    search.
+    """
     return isinstance(command, GOES_ON) or (
         isinstance(command, Pin | Unpin) and state.status == "finished"
     )
@@ -680,7 +718,10 @@ def drops(command: Command, state: RunState) -> str:
     if waits is None:
         return ""
     sizes = f"{len(state.environment)} → {count(waits.size, 'model')}"
-    return f"{as_sentence(waits.label)[:-1]} shows f and waits for you ({sizes}); a new search would drop it."
+    return (
+        f"{as_sentence(waits.label)[:-1]} shows f and waits for you ({sizes}); a new search "
+        "would drop it."
+    )
 
 
 def _begins_anew(command: Command, state: RunState) -> bool:
@@ -688,7 +729,9 @@ def _begins_anew(command: Command, state: RunState) -> bool:
 
 
 def question(command: Command, state: RunState) -> str:
-    """What is asked before a command is sent, or "": also where it breaks off a certificate, or drops a reduction that waits."""
+    """What is asked before a command is sent, or "": also where it breaks off a certificate, or
+    drops a reduction that waits.
+    """
     own = command.words(state).question
     now = in_the_making(state)
     lost = drops(command, state)

@@ -15,7 +15,9 @@ from ddenv.text import Names
 
 @dataclass(frozen=True, slots=True)
 class Pointed:
-    """What the user points at: the `row` under the cursor, which may follow the run (`follows`), and selected `models`."""
+    """What the user points at: the `row` under the cursor, which may follow the run (`follows`),
+    and selected `models`.
+    """
 
     row: c.Row | None = None
     follows: bool = False
@@ -24,9 +26,11 @@ class Pointed:
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """What an action does now: `command` is None if a dialog asks for something first, or if it is not possible.
+    """What an action does now: `command` is None if a dialog asks for something first, or if it is
+    not possible.
 
-    `words` are for the footer, "" if the action's usual ones fit. `why_not` is why it is not possible now, or "".
+    `words` are for the footer, "" if the action's usual ones fit. `why_not` is why it is not
+    possible now, or "".
     """
 
     command: c.Command | c.StartEngine | c.Isolate | None = None
@@ -151,7 +155,9 @@ def _isolate(now: c.Situation, _: Pointed) -> c.Command | c.Isolate:
 
 
 def _any(state: RunState, models: Collection[str]) -> bool:
-    """Whether models are selected; if not, a dialog asks for some. Raises UserError for models that cannot be selected."""
+    """Whether models are selected; if not, a dialog asks for some. Raises UserError for models that
+    cannot be selected.
+    """
     if not models:
         if not state.environment:
             raise UserError("there are no models to choose from")

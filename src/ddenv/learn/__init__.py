@@ -1,1 +1,3 @@
-"""Teaching: lessons over recorded runs, predictions, scores. It needs neither Drake nor an engine, and runs no code of a lesson."""
+"""Teaching: lessons over recorded runs, predictions, scores. It needs neither Drake nor an engine,
+and runs no code of a lesson.
+"""

@@ -1,4 +1,6 @@
-"""A small world whose every part is known: what happens in each, recorded once, and a student's own search in it."""
+"""A small world whose every part is known: what happens in each, recorded once, and a student's own
+search in it.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ MOST_MODELS = 14
 
 @dataclass(frozen=True, slots=True)
 class RecordedRound:
-    """The parts of a round that an algorithm made, and the labels of the candidates that it tested, such as "without A"."""
+    """The parts of a round that an algorithm made, and the labels of the candidates that it tested,
+    such as "without A".
+    """
 
     parts: tuple[Names, ...]
     tested: Names
@@ -45,7 +49,9 @@ class Oracle:
         return self.outcomes.get(frozenset(kept), self.otherwise)
 
     def rate(self, kept: Iterable[str]) -> float:
-        """How often f shows with these models, 0..1. Raises UserError for a model that the world does not have."""
+        """How often f shows with these models, 0..1. Raises UserError for a model that the world
+        does not have.
+        """
         there = frozenset(kept)
         if unknown := there.difference(self.models):
             raise UserError(f"the oracle's world has no model '{min(unknown)}'")
@@ -152,7 +158,9 @@ class Attempt:
     # What the student does.
 
     def test(self, kept: Iterable[str]) -> str:
-        """Tests these models of those that are held; returns the outcome. Raises UserError, with the reason."""
+        """Tests these models of those that are held; returns the outcome. Raises UserError, with
+        the reason.
+        """
         there = frozenset(kept)
         if self.ended:
             raise UserError("this search is over: n begins a new one")

@@ -1,4 +1,6 @@
-"""What a student can foretell at a moment of any run, the reasons to choose from, and what is wrong with the others."""
+"""What a student can foretell at a moment of any run, the reasons to choose from, and what is wrong
+with the others.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,10 @@ REASONS: dict[str, Data] = yaml.safe_load(Path(__file__).with_name("reasons.yaml
 # By the setting `growth`, what n does.
 _GROWTH = {
     "paper": "After each round n grows by one, but never above the number of models.",
-    "steady": "n grows by one after a round without f, but never above the number of models. After a reduction it stays.",
+    "steady": (
+        "n grows by one after a round without f, but never above the number of models. After a "
+        "reduction it stays."
+    ),
 }
 
 
@@ -85,7 +90,10 @@ def _outcome(position: Position, moment: Moment) -> Foretelling | None:
     seen = "The robot reached the goal."
     if test.outcome != "pass":
         away = "" if test.distance is None else f" {test.distance:.1f} m from f's end"
-        seen = f"The robot {deed(test.failure)}{away}: {'that is f' if test.shows_f else 'that is not f'}."
+        seen = (
+            f"The robot {deed(test.failure)}{away}: "
+            f"{'that is f' if test.shows_f else 'that is not f'}."
+        )
     answers = tuple(Answer(words, outcome == test.outcome, seen) for outcome, words in SAID.items())
     label = f"{candidate.label} alone" if candidate.kind == "partition" else f"E {candidate.label}"
     what = f"Test {number} runs {label}: {_named(candidate.models)}. How does it end?"
@@ -153,9 +161,16 @@ def _winner(position: Position, moment: Moment) -> Foretelling | None:
         else f"of which {len(shown)} are listed, in the order of their tests"
     )
     question = Question(
-        f"Round {round.number}: {count(len(listed), 'candidate')}, {order}. Which is the first to show f?",
+        (
+            f"Round {round.number}: {count(len(listed), 'candidate')}, {order}. Which is the first "
+            "to show f?"
+        ),
         tuple(answers),
-        "The first candidate that has everything f needs wins. 'part A' is A alone, 'without A' is all the rest.",
+        (
+            "The first candidate that has everything f needs wins. 'part A' is A alone, 'without "
+            "A' "
+            "is all the rest."
+        ),
     )
     if round.winner is None:
         # The round that leaves out each model alone is the last one without f.
@@ -251,7 +266,8 @@ def _parts(position: Position, moment: Moment) -> Foretelling | None:
         else f"{round.candidates[round.winner].label} showed f"
     )
     question = Question(
-        f"Round {round.number} split {count(before, 'model')} into {count(len(round.partitions), 'part')}, and {asked}. "
+        f"Round {round.number} split {count(before, 'model')} into "
+        f"{count(len(round.partitions), 'part')}, and {asked}. "
         "How does the next round split E?",
         answers,
         _GROWTH[settings(moment.after).growth],

@@ -1,4 +1,6 @@
-"""The summary of a lesson as a page to hand out: its aim, the run in figures and pictures, its texts, questions and answers."""
+"""The summary of a lesson as a page to hand out: its aim, the run in figures and pictures, its
+texts, questions and answers.
+"""
 
 from __future__ import annotations
 

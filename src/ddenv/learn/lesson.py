@@ -1,4 +1,6 @@
-"""A lesson: texts and questions, each at its place in a recorded run. Plain frozen data; `ddenv.learn.reading` makes it."""
+"""A lesson: texts and questions, each at its place in a recorded run. Plain frozen data;
+`ddenv.learn.reading` makes it.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ Foretold = Literal["outcome", "winner", "parts"]
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A possible answer. `why` says what is right or wrong about it; `misconception` is a name of `MISCONCEPTIONS`, or ""."""
+    """A possible answer. `why` says what is right or wrong about it; `misconception` is a name of
+    `MISCONCEPTIONS`, or "".
+    """
 
     text: str
     right: bool
@@ -40,10 +44,12 @@ class Question:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """A step of a lesson: a Markdown `text`, then maybe a question, something to foretell, or something to do.
+    """A step of a lesson: a Markdown `text`, then maybe a question, something to foretell, or
+    something to do.
 
-    `at` is the event of the run that is shown; None leaves it where it is. `budget` is how many tests a student has to search
-    alone, `race` names the algorithms or pairs that race. `line` is the line in the lesson's file.
+    `at` is the event of the run that is shown; None leaves it where it is. `budget` is how many
+    tests a student has to search alone, `race` names the algorithms or pairs that race. `line` is
+    the line in the lesson's file.
     """
 
     text: str
@@ -57,7 +63,8 @@ class Step:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lesson:
-    """`name` is its file's, without number and ending; `minutes` is how long it takes. `oracle` is None without one.
+    """`name` is its file's, without number and ending; `minutes` is how long it takes. `oracle` is
+    None without one.
 
     `beside` are other runs by name, for figures to compare with.
     """

@@ -1,4 +1,6 @@
-"""A student's way through a lesson, or freely through a run: what is shown, asked, answered and skipped. No screen."""
+"""A student's way through a lesson, or freely through a run: what is shown, asked, answered and
+skipped. No screen.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,8 @@ from ddenv.learn.shelf import Opened
 from ddenv.runfile.position import Position, Step
 
 FREE = (
-    "Step through the run: forward, back, to the next decision or reduction. The marked line of the algorithm is at work; "
+    "Step through the run: forward, back, to the next decision or reduction. The marked line of "
+    "the algorithm is at work; "
     "the variables show their values at this moment. Press `p` to predict what comes next."
 )
 # Without f, which is the failure, and h, the key of the hint.
@@ -29,9 +32,11 @@ Activity = Literal["try", "race"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """A question. Its `key` is for the score; once it is answered, the event `until` is shown, and `then` is asked.
+    """A question. Its `key` is for the score; once it is answered, the event `until` is shown, and
+    `then` is asked.
 
-    `chosen` is the place of the given answer, -1 if it was skipped, None while it is open; `hint` says whether that is shown.
+    `chosen` is the place of the given answer, -1 if it was skipped, None while it is open; `hint`
+    says whether that is shown.
     """
 
     key: str
@@ -44,7 +49,8 @@ class Asked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Page:
-    """What the student reads. `chosen` is the place of the given answer, -1 if it was skipped, None while it is open.
+    """What the student reads. `chosen` is the place of the given answer, -1 if it was skipped, None
+    while it is open.
 
     `after` comes below the question: what there is to do, or what came of it.
     """
@@ -69,7 +75,9 @@ class Page:
 
 
 class Course:
-    """At a step of the lesson `opened`, or anywhere in a run without one. The event `at` is shown."""
+    """At a step of the lesson `opened`, or anywhere in a run without one. The event `at` is
+    shown.
+    """
 
     def __init__(
         self, position: Position, opened: Opened | None = None, score: Score | None = None
@@ -151,7 +159,9 @@ class Course:
     # Moves in the lesson.
 
     def go_on(self) -> bool:
-        """To what comes next. False at the end, or while something is open that should be answered, done or skipped."""
+        """To what comes next. False at the end, or while something is open that should be answered,
+        done or skipped.
+        """
         asked = self._asked
         reason = None if self._asked is None else self._asked.then
         if self.is_open or (self.due and self._own is None):
@@ -208,7 +218,9 @@ class Course:
         return answer
 
     def skip(self) -> bool:
-        """Shows the answer of an open question without a score, or passes over what there is to do; False if there is nothing."""
+        """Shows the answer of an open question without a score, or passes over what there is to do;
+        False if there is nothing.
+        """
         if self._asked is None or not self.is_open:
             skipped = self.due
             self.due = False
@@ -281,7 +293,9 @@ class Course:
 
     @property
     def plays(self) -> tuple[Play, ...]:
-        """The searches that the student's own is compared with: none that races later, before the student's bet on that race."""
+        """The searches that the student's own is compared with: none that races later, before the
+        student's bet on that race.
+        """
         if self._opened is None:
             return ()
         steps = list(enumerate(self._steps))[self.step :]
@@ -294,7 +308,9 @@ class Course:
         return tuple(play for name, play in self._opened.plays.items() if name not in secret)
 
     def keep(self, attempt: Attempt) -> None:
-        """After a move of the student's own search. Only one that succeeds counts: to try is no mistake."""
+        """After a move of the student's own search. Only one that succeeds counts: to try is no
+        mistake.
+        """
         self.score = replace(self.score, moves={**self.score.moves, str(self.step): attempt.moves})
         if attempt.ended:
             if attempt.found and len(attempt.tried) <= attempt.budget:
@@ -307,7 +323,9 @@ class Course:
     # Moves in the run.
 
     def move(self, what: Step, by: int) -> bool:
-        """To another moment of the run; False if there is none. In a free walk it closes an answered question."""
+        """To another moment of the run; False if there is none. In a free walk it closes an
+        answered question.
+        """
         if not self.position.step(what, by):
             return False
         if self._opened is None:
@@ -320,7 +338,8 @@ class Course:
         return self._opened is not None and self._own is None and self.is_open
 
     def foretell(self) -> bool:
-        """Asks for a prediction of what comes next in the run; False if nothing is left to foretell.
+        """Asks for a prediction of what comes next in the run; False if nothing is left to
+        foretell.
 
         In a lesson it counts for nothing, and going on leads back to the step.
         """

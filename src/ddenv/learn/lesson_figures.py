@@ -1,8 +1,10 @@
-"""The figures in a lesson's texts: `{names}` from a closed set, over the recorded runs. Nothing is ever computed from a text.
+"""The figures in a lesson's texts: `{names}` from a closed set, over the recorded runs. Nothing is
+ever computed from a text.
 
-`{without NAME}` and `{verdict on NAME}` are a certificate's claim about a model, `{here_bound without NAME}` is what is shown of it
-at the place of the step. `{rate of NAME, NAME}` is the rate that an oracle knows, `{chance of NAME, NAME}` the chance that one of a
-candidate's runs shows f. `{OTHER.name}` is a figure of a run beside the lesson's own.
+`{without NAME}` and `{verdict on NAME}` are a certificate's claim about a model, `{here_bound
+without NAME}` is what is shown of it at the place of the step. `{rate of NAME, NAME}` is the rate
+that an oracle knows, `{chance of NAME, NAME}` the chance that one of a candidate's runs shows f.
+`{OTHER.name}` is a figure of a run beside the lesson's own.
 """
 
 from __future__ import annotations
@@ -43,7 +45,9 @@ def _fresh(state: RunState) -> str:
 
 
 def _fresh_whole(state: RunState) -> str:
-    """How often f showed in the whole world, by the same certificate, if it did not only run where what is left missed f."""
+    """How often f showed in the whole world, by the same certificate, if it did not only run where
+    what is left missed f.
+    """
     found = _certificate(state)
     if found is None:
         return "no fresh run"
@@ -73,7 +77,9 @@ def _now(state: RunState) -> Certificate:
 
 
 def _bound(state: RunState, without: str | None = None) -> str:
-    """What it has shown by now of what is left, or of that without a model. Raises UserError if it has not left that out."""
+    """What it has shown by now of what is left, or of that without a model. Raises UserError if it
+    has not left that out.
+    """
     now = _now(state)
     made = {claim.without: claim for claim in now.claims}
     claim = made.get(without) if made else so_far(state, now).get(without)
@@ -180,7 +186,8 @@ OF_ORACLE: dict[str, Callable[[Oracle], object]] = {
 }
 
 
-# The rates that the oracle knows: of the whole world, at the place of the step, and at the run's end.
+# The rates that the oracle knows: of the whole world, at the place of the step, and at the run's
+# end.
 TRUE_RATES = ("whole_rate", "here_rate", "end_rate")
 # Figures about one model, or about a set of them.
 _ABOUT_CLAIM = re.compile(r"(without|verdict on|here_bound without) (\S.*)")
@@ -221,8 +228,8 @@ def filled(text: str, value: Callable[[str], str]) -> str:
 
 @dataclass(frozen=True)
 class Figures:
-    """What names stand for in a step: `end` is the state at the run's end, `here` at the step's place, `others` have the ends of
-    other runs by name.
+    """What names stand for in a step: `end` is the state at the run's end, `here` at the step's
+    place, `others` have the ends of other runs by name.
     """
 
     end: RunState
@@ -235,7 +242,8 @@ class Figures:
         other, bare = _parts(name)
         if other and other not in self.others:
             raise UserError(
-                f"{{{name}}}: the lesson has no run '{other}' beside its own; give it under the key 'beside'"
+                f"{{{name}}}: the lesson has no run '{other}' beside its own; give it under the "
+                "key 'beside'"
             )
         end = self.others[other] if other else self.end
         if bare in OF_RUN:

@@ -1,4 +1,6 @@
-"""What algorithms did in one world, test by test, as an oracle or run files have it; who needed the fewest tests, and why."""
+"""What algorithms did in one world, test by test, as an oracle or run files have it; who needed the
+fewest tests, and why.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,8 @@ BOUND = "The last line: no search can be sure to find such a set with fewer yes-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Turn:
-    """A test of `candidate` in round `round`, which ended with `outcome`; `left` are the models that are kept after it.
+    """A test of `candidate` in round `round`, which ended with `outcome`; `left` are the models
+    that are kept after it.
 
     `again` says that it repeats a test of the same candidate with another seed.
     """
@@ -47,7 +50,9 @@ class Turn:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Play:
-    """The tests of one search: it begins with the models `begins`. `ended` says whether it came to its end."""
+    """The tests of one search: it begins with the models `begins`. `ended` says whether it came to
+    its end.
+    """
 
     name: str
     begins: Names
@@ -72,7 +77,9 @@ class Play:
 
 
 def recorded_play(name: str, oracle: Oracle) -> Play:
-    """What the algorithm or pair `name` did with an oracle. Raises UserError if that does not fit the oracle."""
+    """What the algorithm or pair `name` did with an oracle. Raises UserError if that does not fit
+    the oracle.
+    """
     environment = oracle.models
     turns = list[Turn]()
     for number, round in enumerate(oracle.rounds[name], 1):
@@ -166,7 +173,9 @@ def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
 
 
 def spent(play: Play, tests: int | None = None) -> dict[str, int]:
-    """How many tests of a search, of the first so many `tests` or of all, were good for what, by `KINDS`."""
+    """How many tests of a search, of the first so many `tests` or of all, were good for what, by
+    `KINDS`.
+    """
     return dict.fromkeys(KINDS, 0) | Counter(map(kind_of, play.turns[:tests]))
 
 
@@ -257,7 +266,9 @@ def result(plays: Sequence[Play]) -> Sentences:
 
 
 def why(first: Play, last: Play) -> str:
-    """Why `first` needed fewer tests than `last`: the kind of tests that makes up most of the difference."""
+    """Why `first` needed fewer tests than `last`: the kind of tests that makes up most of the
+    difference.
+    """
     quick = spent(first)
     slow = spent(last)
     most = max(KINDS, key=lambda kind: slow[kind] - quick[kind])
@@ -291,7 +302,8 @@ def bet(plays: Sequence[Play]) -> Question:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line of the comparison: how many tests somebody made, what was left, and whether one of that can still go.
+    """A line of the comparison: how many tests somebody made, what was left, and whether one of
+    that can still go.
 
     `left` is None for the bound.
     """
@@ -303,7 +315,9 @@ class Line:
 
 
 def comparison(oracle: Oracle, plays: Sequence[Play], attempt: Attempt | None) -> Iterator[Line]:
-    """The student, the algorithms, and the bound for what the student found, or else for the smallest set."""
+    """The student, the algorithms, and the bound for what the student found, or else for the
+    smallest set.
+    """
     if attempt is not None:
         yield Line("you", len(attempt.tried), attempt.held, not attempt.found)
     for play in plays:

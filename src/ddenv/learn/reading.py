@@ -1,4 +1,6 @@
-"""Reads a lesson from its YAML file: plain data, checked key by key, with the line of what is wrong. Nothing in it is ever run."""
+"""Reads a lesson from its YAML file: plain data, checked key by key, with the line of what is
+wrong. Nothing in it is ever run.
+"""
 
 from __future__ import annotations
 
@@ -44,12 +46,15 @@ EXPECTED = f"expected {', '.join((*ALONE[:-1], *(f'{word} N' for word in COUNTED
 _WORDS = re.compile(rf"({'|'.join(ALONE)})|({'|'.join(COUNTED)}) (\d{{1,6}})")
 
 
-# Says which event of a run the words of a lesson name, such as `Places.event`. Raises UserError for other words.
+# Says which event of a run the words of a lesson name, such as `Places.event`. Raises UserError for
+# other words.
 Find = Callable[[str], int]
 
 
 def read_lesson(file: Path, places: Callable[[Path], Find]) -> Lesson:
-    """The lesson in `file`; `places` opens its run. Raises UserError: file, line, key, what is wrong."""
+    """The lesson in `file`; `places` opens its run. Raises UserError: file, line, key, what is
+    wrong.
+    """
     content = read_bytes(file)
     if len(content) > LONGEST:
         raise UserError(f"{file}: is larger than {LONGEST // 1000} kB")
@@ -97,7 +102,9 @@ class _Node:
             raise self.wrong(str(error)) from None
 
     def keys(self, known: tuple[str, ...], *needed: str) -> dict[str, _Node]:
-        """The values of a mapping, which has the keys `needed` and maybe others of those that are `known`."""
+        """The values of a mapping, which has the keys `needed` and maybe others of those that are
+        `known`.
+        """
         if not isinstance(self.node, yaml.MappingNode):
             raise self.wrong(f"expected keys such as {', '.join(known[:3])}")
         found: dict[str, _Node] = {}
@@ -156,7 +163,8 @@ def _beside(node: _Node) -> Path:
     name = node.raw()
     if Path(name).name != name or name in (".", ".."):
         raise node.wrong(
-            f"{name[:60]!r} is not in the lesson's folder; give the name of a file beside the lesson"
+            f"{name[:60]!r} is not in the lesson's folder; give the name of a file beside the "
+            "lesson"
         )
     path = node.file.parent / name
     if not path.is_file():
@@ -246,7 +254,9 @@ def _answer(node: _Node) -> Answer:
 
 
 class Places:
-    """Finds the events of a run by words: `start`, `baseline`, `round 2`, `result 5`, `reduction 1`, `certificate 1` ..."""
+    """Finds the events of a run by words: `start`, `baseline`, `round 2`, `result 5`, `reduction
+    1`, `certificate 1` ...
+    """
 
     def __init__(self, position: Position, events: Sequence[Recorded]) -> None:
         """`events` are all of those that the position was made of."""
@@ -296,6 +306,7 @@ class Places:
         if key not in self._found:
             most = self._most(key[0])
             raise UserError(
-                f"the run has no {words.strip()}{f'; the last one is {key[0]} {most}' if most else ''}"
+                "the run has no "
+                f"{words.strip()}{f'; the last one is {key[0]} {most}' if most else ''}"
             )
         return self._found[key]

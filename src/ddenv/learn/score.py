@@ -1,4 +1,6 @@
-"""A student's answers in a lesson: what was right, the streak, and the misconceptions seen. Plain data, kept as JSON."""
+"""A student's answers in a lesson: what was right, the streak, and the misconceptions seen. Plain
+data, kept as JSON.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ MOST_MOVES = 2000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """`step` is where the student is. `answered` has for each question, by a key such as "3.reason", whether it was right.
+    """`step` is where the student is. `answered` has for each question, by a key such as
+    "3.reason", whether it was right.
 
     `moves` are those of the student's own searches, by their steps.
     """

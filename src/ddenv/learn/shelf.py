@@ -42,7 +42,9 @@ def find_lesson(name: str) -> Path | None:
 
 @dataclass(frozen=True, kw_only=True)
 class Opened:
-    """A lesson with the position in its run, its oracle if it has one, and the ends of the runs beside it."""
+    """A lesson with the position in its run, its oracle if it has one, and the ends of the runs
+    beside it.
+    """
 
     lesson: Lesson
     position: Position
@@ -62,7 +64,9 @@ class Opened:
         return tuple(self.plays[name] for name in step.race)
 
     def text(self, words: str, at: int) -> str:
-        """`words` with their figures, as they are at the event `at`. Raises UserError for one that nothing here knows."""
+        """`words` with their figures, as they are at the event `at`. Raises UserError for one that
+        nothing here knows.
+        """
         here = self.position.state(at)
         return lesson_figures.filled(
             words, Figures(self.position.end, here, self.oracle, self.beside)
@@ -99,12 +103,16 @@ class Opened:
 
 
 def glance(file: Path) -> Lesson:
-    """A lesson for a list: its run is not read, and so its places are not known. Raises UserError as `open_lesson`."""
+    """A lesson for a list: its run is not read, and so its places are not known. Raises UserError
+    as `open_lesson`.
+    """
     return read_lesson(file, lambda run: lambda words: 0)
 
 
 def open_lesson(file: Path) -> Opened:
-    """Raises UserError, in one line, if anything is wrong with the lesson, its run or its oracle."""
+    """Raises UserError, in one line, if anything is wrong with the lesson, its run or its
+    oracle.
+    """
     opened: list[Position] = []
 
     def places(run: Path) -> Callable[[str], int]:
@@ -133,13 +141,16 @@ def open_lesson(file: Path) -> Opened:
 
 
 def _plays(lesson: Lesson, oracle: Oracle) -> dict[str, Play]:
-    """What is recorded of the algorithms. Raises UserError if a step needs more, or if it does not fit the oracle."""
+    """What is recorded of the algorithms. Raises UserError if a step needs more, or if it does not
+    fit the oracle.
+    """
     for step in lesson.steps:
         for name in step.race:
             if name not in oracle.rounds:
                 raise UserError(
                     f"{lesson.file}:{step.line}: race: {name!r} is not recorded yet; "
-                    f"'python -m docs.lessons.record_plays {lesson.file}' records it, in a checkout of ddenv-workbench"
+                    f"'python -m docs.lessons.record_plays {lesson.file}' records it, in a "
+                    "checkout of ddenv-workbench"
                 )
     try:
         return {name: recorded_play(name, oracle) for name in oracle.rounds}
@@ -148,7 +159,9 @@ def _plays(lesson: Lesson, oracle: Oracle) -> dict[str, Play]:
 
 
 def _check(opened: Opened) -> None:
-    """Raises UserError if a text has a figure that is not known, or nothing can be foretold where a step asks for it."""
+    """Raises UserError if a text has a figure that is not known, or nothing can be foretold where a
+    step asks for it.
+    """
     for step, at, found in zip(opened.lesson.steps, opened.places, opened.foretold, strict=True):
         texts = [step.text]
         if (asked := step.question) is not None:
@@ -161,7 +174,8 @@ def _check(opened: Opened) -> None:
             opened.text(" ".join(texts), at)
             if step.foretell is not None and found is None:
                 raise UserError(
-                    "foretell: nothing of this kind can be foretold there; choose another place in the run"
+                    "foretell: nothing of this kind can be foretold there; choose another place "
+                    "in the run"
                 )
         except UserError as error:
             raise UserError(f"{opened.lesson.file}:{step.line}: {error}") from None

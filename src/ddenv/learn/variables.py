@@ -1,4 +1,6 @@
-"""The variables of Algorithm 1 at a moment of a run, with their values, and which of them just changed."""
+"""The variables of Algorithm 1 at a moment of a run, with their values, and which of them just
+changed.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,8 @@ def _values(state: RunState, candidate: Candidate | None) -> dict[str, str]:
     round = state.round
     said = []
     tests = [] if candidate is None else state.tests_of(candidate.tests)
-    # All candidates in short, with their verdicts; the current one between brackets. `-A` is all without A.
+    # All candidates in short, with their verdicts; the current one between brackets. `-A` is all
+    # without A.
     for one in () if round is None else round.candidates:
         letter = one.label.rpartition(" ")[2]
         words = (

@@ -1,1 +1,3 @@
-"""Top-down maps of a world, independent of any screen: outlines of models, character cells, and SVG."""
+"""Top-down maps of a world, independent of any screen: outlines of models, character cells, and
+SVG.
+"""

@@ -1,4 +1,6 @@
-"""The models of a world as character cells: half blocks in colour, or one letter per model without colours."""
+"""The models of a world as character cells: half blocks in colour, or one letter per model without
+colours.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 ROOM = 20  # cells for each letter, so that the map stays readable
-# One per model, the largest first: without S and G, which mark start and goal, and without look-alikes.
+# One per model, the largest first: without S and G, which mark start and goal, and without
+# look-alikes.
 SIGNS = "ABCDEFHJKLMNPQRTUVWXYZabcdefghijkmnopqrstuvwxyz23456789"
 NO_SIGN = "+"
 FLOORS = ".:"
@@ -36,9 +39,11 @@ BRIGHTEST = 225.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signs:
-    """The signs of N models: `texts`, "" for none. At least one sign of each of the `groups` (N,) should be visible.
+    """The signs of N models: `texts`, "" for none. At least one sign of each of the `groups` (N,)
+    should be visible.
 
-    Signs with a lower `rank` (N,) come first; those marked `sure` (N,) are kept even if space is short.
+    Signs with a lower `rank` (N,) come first; those marked `sure` (N,) are kept even if space is
+    short.
     """
 
     texts: Sequence[str]
@@ -50,9 +55,11 @@ class Signs:
 def place_signs(
     grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Collection[Cell] = ()
 ) -> dict[int, Cell]:
-    """The cell where the sign of each model begins, for as many models as stay readable; no two signs overlap.
+    """The cell where the sign of each model begins, for as many models as stay readable; no two
+    signs overlap.
 
-    `grid` (2 rows, columns) holds the owners of pixels, `centers` (N, 2) are in pixels; `taken` cells stay free.
+    `grid` (2 rows, columns) holds the owners of pixels, `centers` (N, 2) are in pixels; `taken`
+    cells stay free.
     """
     rows = grid.shape[0] // 2
     columns = grid.shape[1]
@@ -114,7 +121,9 @@ def signs(models: Sequence[Drawn]) -> list[str]:
 def picture(
     models: Sequence[Drawn], view: View, *, color: bool, dim: Collection[str] = ()
 ) -> Canvas:
-    """All models in `view`, each with its sign; those that are `dim` have none. `PLAIN` is the terminal's own colour."""
+    """All models in `view`, each with its sign; those that are `dim` have none. `PLAIN` is the
+    terminal's own colour.
+    """
     canvas = Canvas(view.rows, view.columns, GREY)
     canvas.fore[:] = PLAIN
     canvas.back[:] = PLAIN

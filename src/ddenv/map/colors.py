@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 RGB = tuple[int, int, int]
-# Eight hues, as distinct as possible for colour-blind readers; parts beyond H repeat the hues, but not the letters.
+# Eight hues, as distinct as possible for colour-blind readers; parts beyond H repeat the hues, but
+# not the letters.
 HUES: tuple[RGB, ...] = (
     (86, 180, 233),
     (240, 160, 40),
@@ -34,7 +35,9 @@ def packed(color: RGB) -> int:
 
 
 def readable(back: int) -> int:
-    """Black or white, whichever is more readable on a packed colour; the terminal's default on its own default."""
+    """Black or white, whichever is more readable on a packed colour; the terminal's default on its
+    own default.
+    """
     if back < 0:
         return PLAIN
     return BLACK if luminance(back) > 110 else WHITE

@@ -1,4 +1,5 @@
-"""What drawings of a world share: which part they show and how large, axes, outlines, marks, and the names on them.
+"""What drawings of a world share: which part they show and how large, axes, outlines, marks, and
+the names on them.
 
 They have no colours but classes: grid, origin, tick, frame, plate, label, badge, sign.
 """
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 # Maximum distance outside the page, pixels: some viewers fail on large numbers.
 FAR = 1e5
 CROSS = 4.0  # half the size of the mark of a model without shapes, pixels
-# Of names: the font, pixels; mean width and height of a letter, relative to the font size; space around, pixels.
+# Of names: the font, pixels; mean width and height of a letter, relative to the font size; space
+# around, pixels.
 SIZE = 12.0
 WIDTH = 0.58
 HEIGHT = 1.15
@@ -39,7 +41,9 @@ LARGE = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """The rectangle from `low` to `high`, m, drawn with `scale` pixels per m at `left` and `top` on the page, pixels."""
+    """The rectangle from `low` to `high`, m, drawn with `scale` pixels per m at `left` and `top` on
+    the page, pixels.
+    """
 
     low: np.ndarray
     high: np.ndarray
@@ -58,9 +62,11 @@ class Frame:
         room: Point,
         at: Point,
     ) -> Frame:
-        """As large as `most` (pixels) allows, with all `points` and models but huge ones, and at least `least` m along each axis.
+        """As large as `most` (pixels) allows, with all `points` and models but huge ones, and at
+        least `least` m along each axis.
 
-        The `margin` is a part of the longer side. The drawing fills at least `room` (pixels), and begins `at` left, top.
+        The `margin` is a part of the longer side. The drawing fills at least `room` (pixels), and
+        begins `at` left, top.
         """
         low, high = extent([each.outline for each in models], points)
         aside = np.maximum(max(0.3, margin * float(max(high - low))), (least - (high - low)) / 2)
@@ -94,7 +100,9 @@ class Frame:
 
 
 def tick_step(span: float, most: int) -> float:
-    """The smallest of 1, 2, 5, 10, 20 ... (and 0.5, 0.2, 0.1 ...) m of which `most` or fewer fit into `span` m."""
+    """The smallest of 1, 2, 5, 10, 20 ... (and 0.5, 0.2, 0.1 ...) m of which `most` or fewer fit
+    into `span` m.
+    """
     least = span / max(1, most)
     if not (math.isfinite(least) and least > 0):
         return 1.0
@@ -121,7 +129,8 @@ def tick_text(value: float, step: float) -> str:
 def plot(
     frame: Frame, most: int, name: str, inside: Iterable[str], above: Iterable[str]
 ) -> Iterator[str]:
-    """A map in its axes: what is `inside` is cut off at its frame, names and marks `above` it are not.
+    """A map in its axes: what is `inside` is cut off at its frame, names and marks `above` it are
+    not.
 
     An axis has at most `most` numbers; `name` is different for each map of a page.
     """
@@ -164,7 +173,9 @@ def badge(name: str, letter: str) -> str:
 
 
 def path_of(each: Drawn, frame: Frame, coarse: bool = False) -> str:
-    """The path of a model's polygons; with none it is a small cross. With `coarse` it is one outline around what is not hollow."""
+    """The path of a model's polygons; with none it is a small cross. With `coarse` it is one
+    outline around what is not hollow.
+    """
     polygons = each.outline.polygons
     if not polygons:
         x, y = frame.pixel(each.outline.center)
@@ -190,7 +201,9 @@ def labels(
     points: Sequence[Point],
     size: float = SIZE,
 ) -> Iterator[str]:
-    """The names of the `most` largest of the `wanted` models that have room for one; none covers the marks at `points`, m."""
+    """The names of the `most` largest of the `wanted` models that have room for one; none covers
+    the marks at `points`, m.
+    """
     largest = sorted(wanted, key=lambda index: -models[index].outline.area)[:most]
     names = {index: shortened(models[index].model.name, LONGEST_LABEL) for index in largest}
     left, top, right, bottom = frame.box
@@ -222,10 +235,12 @@ def place_labels(
     taken: Sequence[np.ndarray] = (),
     size: float = SIZE,
 ) -> dict[int, np.ndarray]:
-    """The boxes of those names, by the numbers of their models, that have room for one, placed in that order.
+    """The boxes of those names, by the numbers of their models, that have room for one, placed in
+    that order.
 
-    `boxes` (N, 4) are of all models, `floors` (N,) have other models on them. All boxes are left, top, right and bottom, pixels, as
-    is the `frame` of the drawing. No label covers the `taken` ones.
+    `boxes` (N, 4) are of all models, `floors` (N,) have other models on them. All boxes are left,
+    top, right and bottom, pixels, as is the `frame` of the drawing. No label covers the `taken`
+    ones.
     """
     occupied = list(taken)
     placed = dict[int, np.ndarray]()
@@ -248,7 +263,9 @@ def place_labels(
 
 
 def _places(box: np.ndarray, long: float, high: float, floor: bool) -> Iterator[np.ndarray]:
-    """Where a name of this size may stand: in the middle of its model or in the corners of a floor, else beside it."""
+    """Where a name of this size may stand: in the middle of its model or in the corners of a floor,
+    else beside it.
+    """
     left, top, right, bottom = box.tolist()
     x = (left + right) / 2
     y = (top + bottom) / 2

@@ -1,4 +1,6 @@
-"""Models from above: the convex outlines of their collision shapes in the world's x and y, m, and how they are drawn."""
+"""Models from above: the convex outlines of their collision shapes in the world's x and y, m, and
+how they are drawn.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +28,12 @@ STATIC: RGB = (150, 156, 166)
 DYNAMIC: RGB = (205, 140, 70)
 # A colour of which all parts are larger would not be seen on paper.
 WHITE = 0.95
-# A model is a floor if its area is `FLOOR_FACTOR` times the median, and at least `FLOOR_AREA`, and it is not `hollow`.
+# A model is a floor if its area is `FLOOR_FACTOR` times the median, and at least `FLOOR_AREA`, and
+# it is not `hollow`.
 FLOOR_FACTOR = 12.0
 FLOOR_AREA = 6.0  # m^2
-# A model is hollow, like the walls of a building, if it covers less than this share of the rectangle around it.
+# A model is hollow, like the walls of a building, if it covers less than this share of the
+# rectangle around it.
 HOLLOW = 0.5
 # What hangs higher than this above the ground closes no door, m.
 HEAD = 1.0
@@ -37,7 +41,9 @@ HEAD = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Footprint:
-    """A model from above: convex `polygons`, each (N, 2) m and anticlockwise, and the corners `low` and `high` around them, m."""
+    """A model from above: convex `polygons`, each (N, 2) m and anticlockwise, and the corners `low`
+    and `high` around them, m.
+    """
 
     name: str
     polygons: tuple[np.ndarray, ...]
@@ -63,14 +69,18 @@ class Footprint:
         return self.covered < HOLLOW * self.area
 
     def distance(self, point: Point) -> float:
-        """The distance from a point to the nearest polygon, m; 0 inside. Without polygons, to the model's centre."""
+        """The distance from a point to the nearest polygon, m; 0 inside. Without polygons, to the
+        model's centre.
+        """
         if not self.polygons:
             return math.dist(self.center, point)
         return min(_distance(polygon, np.array(point)) for polygon in self.polygons)
 
 
 def footprints(world: World) -> tuple[Footprint, ...]:
-    """Footprints of all models except the ground; those that cover most come first, so that small ones are drawn on top."""
+    """Footprints of all models except the ground; those that cover most come first, so that small
+    ones are drawn on top.
+    """
     ground = ground_height(world)
     prints = [footprint(model, ground=ground) for model in world.models if not is_ground(model)]
     # Equal models that are turned differ only by rounding: they stay in the file's order.
@@ -78,7 +88,9 @@ def footprints(world: World) -> tuple[Footprint, ...]:
 
 
 def ground_height(world: World) -> float:
-    """The height of the highest plane or large box, m; infinite without any: a mesh may be hills."""
+    """The height of the highest plane or large box, m; infinite without any: a mesh may be
+    hills.
+    """
     flat = [
         filled_bounds(one)
         for model in world.models
@@ -92,10 +104,12 @@ def ground_height(world: World) -> float:
 def footprint(
     model: Model, corners: int = ROUND, moved: Pose = HERE, ground: float = math.inf
 ) -> Footprint:
-    """The footprint of `model`; a point without collision shapes. Circles become polygons with `corners` corners.
+    """The footprint of `model`; a point without collision shapes. Circles become polygons with
+    `corners` corners.
 
-    Pieces that begin more than `HEAD` above the `ground` (m), or else above its lowest point, are left out: the wall above a door.
-    `moved` is how the model has moved as a whole since the world's file, in the world frame.
+    Pieces that begin more than `HEAD` above the `ground` (m), or else above its lowest point, are
+    left out: the wall above a door. `moved` is how the model has moved as a whole since the world's
+    file, in the world frame.
     """
     polygons = []
     pieces = [
@@ -140,7 +154,8 @@ def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
 class Drawn:
     """A model to draw from above. `center` and `size` are of the box around it, m.
 
-    `color` is that of its first visual, or the default of its kind if the file has none, or white, as meshes without one have.
+    `color` is that of its first visual, or the default of its kind if the file has none, or white,
+    as meshes without one have.
     """
 
     model: Model
@@ -157,7 +172,8 @@ class Drawn:
 
 
 def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
-    """All models except the ground in the order of drawing: floors, the largest first, then the others by height of their top.
+    """All models except the ground in the order of drawing: floors, the largest first, then the
+    others by height of their top.
 
     Of equal tops the larger model comes first. Circles become polygons with `corners` corners.
     """
@@ -191,7 +207,9 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
 
 
 def _turn(each: Drawn) -> tuple[int, float, float]:
-    """The sort key: floors, then models with shapes, then those without; heights in steps of 1 cm."""
+    """The sort key: floors, then models with shapes, then those without; heights in steps of 1
+    cm.
+    """
     group = 0 if each.floor else 1 if each.outline.polygons else 2
     return group, 0.0 if each.floor else round(each.top, 2), -each.outline.area
 

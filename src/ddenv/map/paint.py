@@ -1,4 +1,6 @@
-"""The layers of a map as arrays of character cells with colours, drawn on top of each other, then cut into styled runs."""
+"""The layers of a map as arrays of character cells with colours, drawn on top of each other, then
+cut into styled runs.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ class Run:
 
 
 class Canvas:
-    """`chars` are code points, `fore` and `back` packed colours (or PLAIN), all of shape (rows, columns)."""
+    """`chars` are code points, `fore` and `back` packed colours (or PLAIN), all of shape (rows,
+    columns).
+    """
 
     def __init__(self, rows: int, columns: int, back: RGB | int) -> None:
         color = back if isinstance(back, int) else packed(back)

@@ -1,7 +1,9 @@
-"""From metres to character cells: the view of a map, the model in each half block, and the braille dots of a path.
+"""From metres to character cells: the view of a map, the model in each half block, and the braille
+dots of a path.
 
-A cell is assumed to be twice as high as wide, so a half block is a square pixel and proportions are kept. Rows count
-downwards from the top of the map, the largest y; columns count from the left, the smallest x.
+A cell is assumed to be twice as high as wide, so a half block is a square pixel and proportions are
+kept. Rows count downwards from the top of the map, the largest y; columns count from the left, the
+smallest x.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
 
 SLACK = 1e-9  # tolerance of the fill test at the edges of outlines, pixels
-# A polygon thinner than a pixel and longer than this many of them is widened to one: it would have gaps, or vanish.
+# A polygon thinner than a pixel and longer than this many of them is widened to one: it would have
+# gaps, or vanish.
 SHORT = 3
 EMPTY = -1  # the owner of a pixel without a model
 # The bit of a braille glyph (U+2800 + bits) for the dot at [row, column] of its 4 x 2 grid.
@@ -35,7 +38,9 @@ MOST_PIXELS = 2_000_000  # painted at a time
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """The part of the world on a map of `columns` x `rows` cells: its centre `x`, `y` in m, and `scale` in m per pixel."""
+    """The part of the world on a map of `columns` x `rows` cells: its centre `x`, `y` in m, and
+    `scale` in m per pixel.
+    """
 
     x: float
     y: float
@@ -67,7 +72,9 @@ class View:
         )
 
     def zoomed(self, factor: float, about: Point | None = None) -> View:
-        """The view `factor` times closer; the point `about` (m), by default the centre, stays in place."""
+        """The view `factor` times closer; the point `about` (m), by default the centre, stays in
+        place.
+        """
         scale = min(COARSEST, max(FINEST, self.scale / factor))
         x, y = about or (self.x, self.y)
         part = scale / self.scale
@@ -110,10 +117,12 @@ def fit(
 
 
 def extent(prints: Sequence[Footprint], points: Iterable[Point]) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest corner of all `points` and of the models except huge ones, m; 10 m around zero for nothing.
+    """Lowest and highest corner of all `points` and of the models except huge ones, m; 10 m around
+    zero for nothing.
 
-    A model is huge if it is several times larger than the area that the smaller models, and the points among them, span. The
-    smallest model is shown whole, however short the way between the points is: it may be a building.
+    A model is huge if it is several times larger than the area that the smaller models, and the
+    points among them, span. The smallest model is shown whole, however short the way between the
+    points is: it may be a building.
     """
     corners = np.array([point for point in points if len(point)], dtype=float).reshape(-1, 2)
     boxes = np.array([(*each.low, *each.high, each.area) for each in prints], dtype=float).reshape(
@@ -138,10 +147,12 @@ def extent(prints: Sequence[Footprint], points: Iterable[Point]) -> tuple[np.nda
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Outlines:
-    """The polygons of all models in flat arrays: polygon p has `counts[p]` of the `corners` (M, 2) m, from `first[p]` on.
+    """The polygons of all models in flat arrays: polygon p has `counts[p]` of the `corners` (M, 2)
+    m, from `first[p]` on.
 
-    `models[p]` is the model of polygon p, `middles[p]` (2,) m its middle; `lengths[p]` and `widths[p]` are its diagonal and its
-    mean width across it, m. Per model: `centers` (N, 2) m, and `bare` (N,) if it has none.
+    `models[p]` is the model of polygon p, `middles[p]` (2,) m its middle; `lengths[p]` and
+    `widths[p]` are its diagonal and its mean width across it, m. Per model: `centers` (N, 2) m, and
+    `bare` (N,) if it has none.
     """
 
     corners: np.ndarray
@@ -157,7 +168,8 @@ class Outlines:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spans:
-    """Runs of pixels in a grid in row-major order: `lengths[i]` pixels from `starts[i]` on belong to `models[i]`.
+    """Runs of pixels in a grid in row-major order: `lengths[i]` pixels from `starts[i]` on belong
+    to `models[i]`.
 
     They are sorted by model.
     """
@@ -227,7 +239,8 @@ def spans(outlines: Outlines, view: View) -> Spans:
 def rows_of(outlines: Outlines, view: View) -> tuple[np.ndarray, ...]:
     """Polygon, row, first and last column of each row of pixels in a polygon.
 
-    A pixel belongs to a polygon if its centre is inside, or to a thin one if it is at most `wider` outside.
+    A pixel belongs to a polygon if its centre is inside, or to a thin one if it is at most `wider`
+    outside.
     """
     width = view.columns
     height = 2 * view.rows
@@ -253,7 +266,8 @@ def rows_of(outlines: Outlines, view: View) -> tuple[np.ndarray, ...]:
         count = outlines.counts[polygon[some]]
         ax, ay = corners[start + edge].T
         bx, by = corners[start + (edge + 1) % count].T
-        # Anticlockwise in the world is clockwise in pixels, whose y points down: inside is dx (y - ay) - dy (x - ax) <= 0.
+        # Anticlockwise in the world is clockwise in pixels, whose y points down: inside is dx (y -
+        # ay) - dy (x - ax) <= 0.
         dx = bx - ax
         dy = by - ay
         lean = dx * (row[some] + 0.5 - ay) - SLACK - wider[polygon[some]] * np.hypot(dx, dy)
@@ -272,7 +286,9 @@ def rows_of(outlines: Outlines, view: View) -> tuple[np.ndarray, ...]:
 def owners(
     filled: Spans, view: View, drawn: Sequence[int] | np.ndarray | None = None
 ) -> np.ndarray:
-    """The model on each pixel, shape (2 rows, columns): the last of the `drawn` ones (default all) that fill it, else EMPTY."""
+    """The model on each pixel, shape (2 rows, columns): the last of the `drawn` ones (default all)
+    that fill it, else EMPTY.
+    """
     grid = np.full(2 * view.rows * view.columns, EMPTY, dtype=np.int32)
     models = filled.models
     starts = filled.starts
@@ -300,9 +316,11 @@ def _within(counts: np.ndarray) -> np.ndarray:
 
 
 def label_cells(grid: np.ndarray, centers: np.ndarray) -> np.ndarray:
-    """The cell (row, column) for the letter of each model, shape (N, 2): the filled cell nearest to its centre (pixels).
+    """The cell (row, column) for the letter of each model, shape (N, 2): the filled cell nearest to
+    its centre (pixels).
 
-    A model that fills no cell takes one whose upper, or else lower, half it fills; -1 if it is not visible.
+    A model that fills no cell takes one whose upper, or else lower, half it fills; -1 if it is not
+    visible.
     """
     upper = grid[0::2]
     lower = grid[1::2]
@@ -326,7 +344,8 @@ def _nearest(owned: np.ndarray, centers: np.ndarray) -> np.ndarray:
 
 
 def braille(points: np.ndarray, view: View, dash: int = 0) -> np.ndarray:
-    """The braille bits of each cell on the polyline through `points` (N, 2) m, shape (rows, columns), uint8.
+    """The braille bits of each cell on the polyline through `points` (N, 2) m, shape (rows,
+    columns), uint8.
 
     `dash` is the number of dots drawn and then skipped in turn; 0 draws all.
     """
@@ -334,7 +353,8 @@ def braille(points: np.ndarray, view: View, dash: int = 0) -> np.ndarray:
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         return cells
-    # The dots along the line, without gaps. Points far outside are invisible, and would only make it long.
+    # The dots along the line, without gaps. Points far outside are invisible, and would only make
+    # it long.
     places = np.clip(view.pixels(points) * 2, -4000, 4000)
     counts = np.maximum(1, np.ceil(np.abs(np.diff(places, axis=0)).max(axis=1)).astype(int))
     start = np.repeat(np.arange(len(counts)), counts)

@@ -36,7 +36,8 @@ svg { font: 12px Inter, "Segoe UI", Helvetica, Arial, "DejaVu Sans", sans-serif;
 .dynamic { stroke-width: 1.4; stroke-dasharray: 5 3; }
 .bare { stroke: #24292f; stroke-width: 1.5; }
 .plate { fill: none; }
-.label { text-anchor: middle; pointer-events: none; paint-order: stroke; stroke: #ffffff; stroke-opacity: 0.7; stroke-width: 3; }
+.label { text-anchor: middle; pointer-events: none; paint-order: stroke; }
+.label { stroke: #ffffff; stroke-opacity: 0.7; stroke-width: 3; }
 .badge { stroke: #ffffff; stroke-width: 2; }
 .start { fill: #1f6feb; }
 .goal { fill: #1a7f37; }
@@ -62,7 +63,10 @@ def svg_map(world: World, *, spawn: Vector | None = None, goal: Point | None = N
     if spawn is not None:
         x, y, yaw = spawn
         title = f"<title>start ({x:g}, {y:g}) m, yaw {yaw:g} rad</title>"
-        arrow = f'<path class="start" transform="rotate({-math.degrees(yaw):.1f})" d="M7 -8L26 0L7 8Z"/>'
+        arrow = (
+            f'<path class="start" transform="rotate({-math.degrees(yaw):.1f})" d="M7 -8L26 0L7 '
+            '8Z"/>'
+        )
         marks.append(at(frame.pixel((x, y)), f"{title}{arrow}{badge('start', 'S')}"))
     if goal is not None:
         title = f"<title>goal ({goal[0]:g}, {goal[1]:g}) m</title>"
@@ -73,7 +77,10 @@ def svg_map(world: World, *, spawn: Vector | None = None, goal: Point | None = N
         f"<style>{STYLE}</style>",
         f"<title>{written(world.path.name)}</title>",
         '<rect width="100%" height="100%" fill="#ffffff"/>',
-        f'<text class="title" x="{LEFT:.0f}" y="34">{written(shortened(world.path.name, 48))}</text>',
+        (
+            f'<text class="title" x="{LEFT:.0f}" '
+            f'y="34">{written(shortened(world.path.name, 48))}</text>'
+        ),
         tick(LEFT, 56, "start", f"{count(len(models), 'model')}, without the ground"),
         *plot(frame, 16, "map", (_model(each, frame) for each in models), [*names, *marks]),
         "</svg>",
@@ -96,4 +103,7 @@ def _model(each: Drawn, frame: Frame) -> str:
         f"{written(each.model.name)}\n{'static' if each.model.static else 'dynamic'}, {size} m\n"
     )
     words += f"pose {x:z.2f}, {y:z.2f}, {z:z.2f} m, yaw {yaw:z.2f} rad, top at {each.top:.2f} m"
-    return f'<path class="{" ".join(kinds)}" {color} d="{path_of(each, frame)}"><title>{words}</title></path>'
+    return (
+        f'<path class="{" ".join(kinds)}" {color} '
+        f'd="{path_of(each, frame)}"><title>{words}</title></path>'
+    )

@@ -32,7 +32,9 @@ Cell = Part | tuple[Part, ...]
 
 @dataclass(frozen=True, slots=True)
 class Paragraph:
-    """Sentences. A `notice` says what the reader must not overlook, such as that a run has not ended."""
+    """Sentences. A `notice` says what the reader must not overlook, such as that a run has not
+    ended.
+    """
 
     parts: tuple[Part, ...]
     notice: bool = False
@@ -40,7 +42,9 @@ class Paragraph:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of cells below a `head`. Columns with a number in `right` are aligned to the right; `strong` rows stand out."""
+    """Rows of cells below a `head`. Columns with a number in `right` are aligned to the right;
+    `strong` rows stand out.
+    """
 
     head: tuple[str, ...]
     rows: Sequence[tuple[Cell, ...]]
@@ -50,7 +54,9 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A drawing. `svg` takes its colours from the classes of `style.css`; `alternative` describes it in words."""
+    """A drawing. `svg` takes its colours from the classes of `style.css`; `alternative` describes
+    it in words.
+    """
 
     name: str
     svg: str
@@ -78,7 +84,9 @@ class Section:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """A whole report: its name, the result in a few words, `figures` (number, what it counts), and its sections."""
+    """A whole report: its name, the result in a few words, `figures` (number, what it counts), and
+    its sections.
+    """
 
     name: str
     verdict: str

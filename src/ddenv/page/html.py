@@ -1,4 +1,6 @@
-"""A report as one HTML page that needs nothing else: no script, no other file; and what our pages may load and run."""
+"""A report as one HTML page that needs nothing else: no script, no other file; and what our pages
+may load and run.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,10 @@ def html(report: Report) -> str:
     lines = [
         "<!DOCTYPE html>",
         '<html lang="en"><head><meta charset="utf-8">',
-        f'<meta http-equiv="Content-Security-Policy" content="{policy({"style-src": hashed(style)})}">',
+        (
+            '<meta http-equiv="Content-Security-Policy" '
+            f'content="{policy({"style-src": hashed(style)})}">'
+        ),
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{_text(report.name)}: {_text(report.verdict)}</title>",
         f"<style>{style}</style></head><body><main>",
@@ -96,7 +101,10 @@ def _table(table: Table) -> str:
             for side, cell in zip(sides, row, strict=True)
         )
         rows.append(f"<tr{strong}>{''.join(cells)}</tr>\n")
-    return f'<div class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{"".join(rows)}</tbody></table></div>'
+    return (
+        "<div "
+        f'class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{"".join(rows)}</tbody></table></div>'
+    )
 
 
 def _part(part: Part) -> str:

@@ -42,7 +42,10 @@ def chart(state: RunState) -> str:
 
 
 def opening(height: float) -> str:
-    return f'<svg xmlns="http://www.w3.org/2000/svg" class="drawing" role="img" viewBox="0 0 {WIDTH:.0f} {height:.0f}">'
+    return (
+        '<svg xmlns="http://www.w3.org/2000/svg" class="drawing" role="img" viewBox="0 0 '
+        f'{WIDTH:.0f} {height:.0f}">'
+    )
 
 
 def scale(last: int, most: int, height: float = HEIGHT) -> At:
@@ -71,7 +74,9 @@ def steps(points: Sequence[tuple[int, int]]) -> Steps:
 
 
 def axes(at: At, last: int, most: int) -> Iterator[str]:
-    """Both axes up to `last` tests and `most` models; `at` gives x and y of a number of tests and of models, pixels."""
+    """Both axes up to `last` tests and `most` models; `at` gives x and y of a number of tests and
+    of models, pixels.
+    """
     right, floor = at(last, 0)
     step = max(1.0, tick_step(most, 6))
     for value in ticks(0, most, step):

@@ -1,1 +1,3 @@
-"""The reduction itself: partitionings, prioritizations, algorithms, verdicts and rates. It is pure: it runs nothing."""
+"""The reduction itself: partitionings, prioritizations, algorithms, verdicts and rates. It is pure:
+it runs nothing.
+"""

@@ -1,6 +1,8 @@
-"""The algorithms: generators that yield rounds and return the minimal environment. One function for each.
+"""The algorithms: generators that yield rounds and return the minimal environment. One function for
+each.
 
-An algorithm yields a `Round` and is sent the first similar candidate, or None. It runs nothing itself.
+An algorithm yields a `Round` and is sent the first similar candidate, or None. It runs nothing
+itself.
 """
 
 from __future__ import annotations
@@ -27,22 +29,27 @@ from ddenv.reduction.round import (
     one_model_partitions,
 )
 
-# A model is taken to be needed once the probability that it is not is below this; it is tried again at the end.
+# A model is taken to be needed once the probability that it is not is below this; it is tried again
+# at the end.
 DOUBT = 0.25
-# After a round in which each of so many parts was needed, many models are: binary splitting finds them in fewer tests.
+# After a round in which each of so many parts was needed, many models are: binary splitting finds
+# them in fewer tests.
 MANY_NEEDED = 6
 
 
 def ddenv(elements: Partition, guide: Guide) -> Search:
-    """The paper's algorithm. Each round splits the environment into n partitions and tries them in the order of the prioritization,
-    each followed by its complement. The first candidate that shows the failure becomes the environment. n grows with the rounds.
-    The search ends when no candidate in a round of single models and their complements shows it: no single model can be removed.
+    """The paper's algorithm. Each round splits the environment into n partitions and tries them in
+    the order of the prioritization, each followed by its complement. The first candidate that shows
+    the failure becomes the environment. n grows with the rounds. The search ends when no candidate
+    in a round of single models and their complements shows it: no single model can be removed.
 
-    Paper, Algorithm 1; n never exceeds |E|. (As printed, it increments n before it checks, and would end one granularity early.)
-    The last model is tested, too: f may need no model at all. With the guide's `growth` "steady", n grows only after rounds that
-    found nothing, and a round always has n partitions; with `skip` "implied", candidates that lack everything that was missed
+    Paper, Algorithm 1; n never exceeds |E|. (As printed, it increments n before it checks, and
+    would end one granularity early.) The last model is tested, too: f may need no model at all.
+    With the guide's `growth` "steady", n grows only after rounds that found nothing, and a round
+    always has n partitions; with `skip` "implied", candidates that lack everything that was missed
     before are skipped. Where none of `MANY_NEEDED` parts could go, a "steady" search ends as
-    `splitting` does. The search `proves` that its end is minimal by trying to leave out each single model all the same.
+    `splitting` does. The search `proves` that its end is minimal by trying to leave out each single
+    model all the same.
     """
     environment = elements
     n = guide.n_partitions
@@ -82,7 +89,8 @@ def _split(environment: Partition, n: int, guide: Guide) -> list[Partition]:
 def _halved(partitions: list[Partition], n: int, guide: Guide) -> list[Partition]:
     """Exactly n partitions: halves the largest, in the order in which its models would rank alone.
 
-    Where a robot stands still, one instant may be the nearest to thousands of models: no split by time separates them.
+    Where a robot stands still, one instant may be the nearest to thousands of models: no split by
+    time separates them.
     """
     parts = list(partitions)
     while len(parts) < n:
@@ -102,10 +110,12 @@ def _missed(
     missed: list[Environment],
     broke: Callable[[Candidate], bool],
 ) -> list[Environment]:
-    """Groups of models of which at least one is needed, provided that f shows whenever everything that it needs is there.
+    """Groups of models of which at least one is needed, provided that f shows whenever everything
+    that it needs is there.
 
-    A candidate without f leaves out such a group, as far as its models are still in the environment. A group that is gone
-    altogether was not needed after all: f showed by chance, or does not show in every such environment.
+    A candidate without f leaves out such a group, as far as its models are still in the
+    environment. A group that is gone altogether was not needed after all: f showed by chance, or
+    does not show in every such environment.
     """
     failed = takewhile(lambda one: one is not winner, round.candidates)
     found = [*missed, *(one.lacks for one in failed if not broke(one))]
@@ -115,7 +125,9 @@ def _missed(
 
 
 def _without_implied(round: Round, missed: list[Environment], proves: bool) -> Round:
-    """`round` without candidates that lack a whole group of `missed`, or all that an earlier candidate of the round lacks."""
+    """`round` without candidates that lack a whole group of `missed`, or all that an earlier
+    candidate of the round lacks.
+    """
     lacked = list(missed)
     worth = []
     for one in round.candidates:
@@ -126,13 +138,14 @@ def _without_implied(round: Round, missed: list[Environment], proves: bool) -> R
 
 
 def ddmin(elements: Partition, guide: Guide | None = None) -> Search:
-    """Classic delta debugging. It cuts the environment into n chunks in the order of the world file, and first tries each chunk
-    alone, then each complement. A chunk that shows the failure is split in two; a complement keeps its n - 1 chunks; when nothing
-    shows the failure, n doubles. It uses neither positions nor the place of the failure, so it is the baseline that shows what
-    space and time are worth.
+    """Classic delta debugging. It cuts the environment into n chunks in the order of the world
+    file, and first tries each chunk alone, then each complement. A chunk that shows the failure is
+    split in two; a complement keeps its n - 1 chunks; when nothing shows the failure, n doubles. It
+    uses neither positions nor the place of the failure, so it is the baseline that shows what space
+    and time are worth.
 
-    Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002. The last model is tested, too. It asks nothing
-    of a guide.
+    Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002. The last model
+    is tested, too. It asks nothing of a guide.
     """
     environment = elements
     partitions = _cut(elements, 2)
@@ -161,10 +174,11 @@ def _cut(environment: Partition, n: int) -> list[Partition]:
 
 
 def probdd(elements: Partition, guide: Guide) -> Search:
-    """Probabilistic delta debugging. Each model has a probability of being needed, at first from its distance to the failure (or
-    the same for all, with the scenario's key `reduction.prior: uniform`). Each test leaves out the group with the greatest expected
-    gain; if the failure does not show, the probabilities of the group rise. When no candidate is left, each remaining model is left
-    out once more.
+    """Probabilistic delta debugging. Each model has a probability of being needed, at first from
+    its distance to the failure (or the same for all, with the scenario's key `reduction.prior:
+    uniform`). Each test leaves out the group with the greatest expected gain; if the failure does
+    not show, the probabilities of the group rise. When no candidate is left, each remaining model
+    is left out once more.
 
     Wang et al., "Probabilistic Delta Debugging", 2021.
     """
@@ -185,7 +199,9 @@ def probdd(elements: Partition, guide: Guide) -> Search:
 
 
 def _best_group(environment: Partition, chance: dict[int, float]) -> Partition:
-    """The least likely models: as many as maximize their number times the probability that none of them is needed."""
+    """The least likely models: as many as maximize their number times the probability that none of
+    them is needed.
+    """
     order = [model for model in sorted(environment, key=chance.__getitem__) if chance[model] < 1.0]
     if not order:
         return ()
@@ -194,13 +210,15 @@ def _best_group(environment: Partition, chance: dict[int, float]) -> Partition:
 
 
 def splitting(elements: Partition, guide: Guide) -> Search:
-    """Binary splitting. It sorts the models by the prioritization, far to near. Each test leaves out a group from the far end, of
-    the most informative size: the failure shows about as often as not. If it does not show, smaller groups are left out, until the
-    farthest needed model is found. Where the failure does not show in every run, one run is made without a group, and a miss only
-    makes it likelier that the group is needed. At the end each remaining model is left out once more, in as many runs as any
-    other candidate. It takes close to the minimum number of tests.
+    """Binary splitting. It sorts the models by the prioritization, far to near. Each test leaves
+    out a group from the far end, of the most informative size: the failure shows about as often as
+    not. If it does not show, smaller groups are left out, until the farthest needed model is found.
+    Where the failure does not show in every run, one run is made without a group, and a miss only
+    makes it likelier that the group is needed. At the end each remaining model is left out once
+    more, in as many runs as any other candidate. It takes close to the minimum number of tests.
 
-    Noisy binary search (Burnashev and Zigangirov, 1974) for the farthest needed model, with the guide's probabilities as prior.
+    Noisy binary search (Burnashev and Zigangirov, 1974) for the farthest needed model, with the
+    guide's probabilities as prior.
     """
     scores = guide.rank(one_model_partitions(elements)) if elements else []
     line = tuple(
@@ -239,7 +257,9 @@ def splitting(elements: Partition, guide: Guide) -> Search:
 
 
 def _spared(weights: Floats, misses: dict[int, int], guide: Guide) -> Floats:
-    """The probability that none of the first 1, 2, ... models of the line is needed, shape (len(weights),)."""
+    """The probability that none of the first 1, 2, ... models of the line is needed, shape
+    (len(weights),).
+    """
     none = np.exp(-np.cumsum(np.append(0.0, weights)))
     # That the first needed model is number 0, 1, ... of the line, and that none is needed.
     first = np.append(-np.diff(none), none[-1])
@@ -249,7 +269,8 @@ def _spared(weights: Floats, misses: dict[int, int], guide: Guide) -> Floats:
 
 
 def _most_telling(rate: float) -> float:
-    """The probability of being spared with which a group tells most in one run: the optimum of a Z-channel.
+    """The probability of being spared with which a group tells most in one run: the optimum of a
+    Z-channel.
 
     f shows at `rate` (above 0) without a group that is spared, never without another one.
     """
@@ -260,11 +281,12 @@ def _most_telling(rate: float) -> float:
 
 
 def sweep(environment: Partition, runs: int | None = None) -> Search:
-    """Leaves out each model in turn, in the environment's order, until none can be left out; returns what remains.
+    """Leaves out each model in turn, in the environment's order, until none can be left out;
+    returns what remains.
 
-    After a success it goes on with the next model: those before were just found to be needed. They are tried again at the end.
-    With `runs`, all models have one run before any has a second one, up to `runs`: a model that is not needed is found before the
-    others have had theirs.
+    After a success it goes on with the next model: those before were just found to be needed. They
+    are tried again at the end. With `runs`, all models have one run before any has a second one, up
+    to `runs`: a model that is not needed is found before the others have had theirs.
     """
     looks = None if runs is None else 1
     while environment:
@@ -284,7 +306,9 @@ def sweep(environment: Partition, runs: int | None = None) -> Search:
 def tried_again(
     environment: Partition, groups: Sequence[Partition], search: Callable[[Partition], Search]
 ) -> Search:
-    """Leaves out each group, or halves of it where that fails; then searches what is left. For a search that stepped back."""
+    """Leaves out each group, or halves of it where that fails; then searches what is left. For a
+    search that stepped back.
+    """
     waiting = list(reversed(groups))
     while waiting:
         inside = frozenset(environment)

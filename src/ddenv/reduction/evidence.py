@@ -1,4 +1,6 @@
-"""The evidence that partitionings and prioritizations can use: positions, the trajectory, what was sensed, finished tests."""
+"""The evidence that partitionings and prioritizations can use: positions, the trajectory, what was
+sensed, finished tests.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ LEAST = 1e-6
 MOST = 1.0 - 1e-6
 # The expected number of needed models in each e-fold of the distance's rank.
 DENSITY = 0.5
-# How many models are compared with the whole path at a time: 5,000 at once would take hundreds of MB.
+# How many models are compared with the whole path at a time: 5,000 at once would take hundreds of
+# MB.
 BLOCK = 256
 
 
@@ -30,7 +33,9 @@ class Lacking(Exception):
 
 @dataclass(frozen=True)
 class Traits:
-    """A model's properties: the longest side of its box (m), its friction coefficient, whether it can move."""
+    """A model's properties: the longest side of its box (m), its friction coefficient, whether it
+    can move.
+    """
 
     size: float = 0.0
     friction: float = 1.0
@@ -39,7 +44,9 @@ class Traits:
 
 @dataclass(frozen=True)
 class Trial:
-    """One finished test: the models that were there, and whether it showed f. `elements` are the names of all models."""
+    """One finished test: the models that were there, and whether it showed f. `elements` are the
+    names of all models.
+    """
 
     environment: Environment
     similar: bool
@@ -53,12 +60,14 @@ class Trial:
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
-    """What is known about the world, about the last similar run in the current environment, and from all tests so far.
+    """What is known about the world, about the last similar run in the current environment, and
+    from all tests so far.
 
-    `elements` are in the order of the world file. `positions` maps a model to x, y, z (m). `trajectory` (N, 5) is time (s), x,
-    y, z (m), yaw (rad) of that run; `failure_position` where f ended, x, y, z (m). `first_sensed` maps a model to the time (s)
-    when that run first sensed it. `miss_chance` is the probability that a candidate shows f in none of its tests although all
-    that f needs is there. `delta` is in rad/s. A field that is None is unknown; `need` raises for it.
+    `elements` are in the order of the world file. `positions` maps a model to x, y, z (m).
+    `trajectory` (N, 5) is time (s), x, y, z (m), yaw (rad) of that run; `failure_position` where f
+    ended, x, y, z (m). `first_sensed` maps a model to the time (s) when that run first sensed it.
+    `miss_chance` is the probability that a candidate shows f in none of its tests although all that
+    f needs is there. `delta` is in rad/s. A field that is None is unknown; `need` raises for it.
     """
 
     elements: Names
@@ -101,8 +110,8 @@ class Evidence:
         )
 
     def nearest(self, models: Names) -> Floats:
-        """For each of `models`, how near the robot's path comes to it (m) and when (s): shape (len(models), 2). Raises Lacking.
-        Computed once for the whole world.
+        """For each of `models`, how near the robot's path comes to it (m) and when (s): shape
+        (len(models), 2). Raises Lacking. Computed once for the whole world.
         """
         if not self._nearest:
             times = self.need("trajectory")[:, 0]
@@ -118,7 +127,9 @@ class Evidence:
 
 
 def distances_to_failure(environment: Names, evidence: Evidence) -> Floats:
-    """A lower bound of each model's distance from the end of f, shape (len(environment),), m. Raises Lacking."""
+    """A lower bound of each model's distance from the end of f, shape (len(environment),), m.
+    Raises Lacking.
+    """
     end = np.array(evidence.need("failure_position"))
     apart = np.linalg.norm(evidence.places(environment) - end, axis=1)
     sizes = (
@@ -130,8 +141,8 @@ def distances_to_failure(environment: Names, evidence: Evidence) -> Floats:
 
 
 def spatial_prior(environment: Names, evidence: Evidence) -> Floats:
-    """The probability that each model is needed, shape (len(environment),): it falls with the rank of its distance to f, as
-    1 / rank, and has no scale. Raises Lacking.
+    """The probability that each model is needed, shape (len(environment),): it falls with the rank
+    of its distance to f, as 1 / rank, and has no scale. Raises Lacking.
     """
     ranks = np.argsort(
         np.argsort(distances_to_failure(environment, evidence), kind="stable"), kind="stable"
@@ -140,9 +151,11 @@ def spatial_prior(environment: Names, evidence: Evidence) -> Floats:
 
 
 def nearest_on_path(places: Floats, times: Floats, path: Floats) -> tuple[Floats, Floats]:
-    """The distance (m) of each of `places` (M, 3) from the path (N, 3), and when (s) the robot was at the nearest point: two (M,).
+    """The distance (m) of each of `places` (M, 3) from the path (N, 3), and when (s) the robot was
+    at the nearest point: two (M,).
 
-    The path is the segments between its points, reached at `times` (N,). Of several nearest points the first counts.
+    The path is the segments between its points, reached at `times` (N,). Of several nearest points
+    the first counts.
     """
     if len(path) == 1:
         path = np.repeat(path, 2, axis=0)
@@ -162,7 +175,9 @@ def nearest_on_path(places: Floats, times: Floats, path: Floats) -> tuple[Floats
 
 
 def to_segments(places: Floats, path: Floats) -> tuple[Floats, Floats]:
-    """The distance (m) of each place (M, 3) to each segment of the path (N, 3), and the fraction along it: two (M, N - 1)."""
+    """The distance (m) of each place (M, 3) to each segment of the path (N, 3), and the fraction
+    along it: two (M, N - 1).
+    """
     steps = np.diff(path, axis=0)
     lengths = np.einsum("ij,ij->i", steps, steps)
     along = places @ steps.T - np.einsum("ij,ij->i", path[:-1], steps)

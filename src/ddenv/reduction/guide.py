@@ -1,4 +1,6 @@
-"""The guide of an algorithm: how to split and rank the environment, and which models are likely to be needed."""
+"""The guide of an algorithm: how to split and rank the environment, and which models are likely to
+be needed.
+"""
 
 from __future__ import annotations
 
@@ -27,11 +29,13 @@ _ARGUMENTS = {"trajectory": "a trajectory", "failure_position": "a failure_pose"
 class Guide:
     """What an algorithm asks while it searches. Models are numbers, in the order of the world file.
 
-    `split(environment, n)` returns at most n partitions; `rank(partitions)` their scores, the lowest is tried first;
-    `chances(environment)` the probability that each model is needed, shape (len(environment),), before any test. `n_partitions`,
-    `candidates`, `complement_order`, `growth` and `skip` are those of the settings. `rate()` is the rate at which f shows in a
-    single run where all that it needs is there, `runs()` how many runs a candidate has if none shows f, `broke(candidate)`
-    whether its tests say nothing about f. `proves`: the search has to show by itself that its end is minimal.
+    `split(environment, n)` returns at most n partitions; `rank(partitions)` their scores, the
+    lowest is tried first; `chances(environment)` the probability that each model is needed, shape
+    (len(environment),), before any test. `n_partitions`, `candidates`, `complement_order`, `growth`
+    and `skip` are those of the settings. `rate()` is the rate at which f shows in a single run
+    where all that it needs is there, `runs()` how many runs a candidate has if none shows f,
+    `broke(candidate)` whether its tests say nothing about f. `proves`: the search has to show by
+    itself that its end is minimal.
     """
 
     split: Callable[[Partition, int], list[Partition]]
@@ -56,11 +60,12 @@ def make_guide(
     prior: str = "spatial",
     **more: Any,
 ) -> Guide:
-    """A guide for the schemas of these names, which look at what `evidence()` returns at that moment, and see models by name.
+    """A guide for the schemas of these names, which look at what `evidence()` returns at that
+    moment, and see models by name.
 
-    Raises UserError for unknown names; a schema that lacks evidence raises UserError when it is used. A schema that is a class
-    is instantiated for each guide. `prior` is "uniform", or "spatial" where that can be known. `more` are the other fields of
-    `Guide`.
+    Raises UserError for unknown names; a schema that lacks evidence raises UserError when it is
+    used. A schema that is a class is instantiated for each guide. `prior` is "uniform", or
+    "spatial" where that can be known. `more` are the other fields of `Guide`.
     """
     split = _made("partitioning", partitioning)
     rank = _made("prioritization", prioritization)
@@ -73,7 +78,8 @@ def make_guide(
         models = [name for part in partitions for name in part]
         if not all(partitions) or Counter(models) != Counter(names):
             raise UserError(
-                f"partitioning '{partitioning}': its partitions must be disjoint, not empty, and cover E"
+                f"partitioning '{partitioning}': its partitions must be disjoint, not empty, and "
+                "cover E"
             )
         numbers = {name: number for number, name in enumerate(known.elements)}
         return [tuple(map(numbers.__getitem__, part)) for part in partitions]

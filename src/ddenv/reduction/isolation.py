@@ -1,9 +1,10 @@
-"""Isolation: the fewest models that have to go from the whole world so that the robot reaches its goal. It makes a passing world
-larger, until putting any one model back makes the robot fail: the same search with another predicate, over what is removed.
+"""Isolation: the fewest models that have to go from the whole world so that the robot reaches its
+goal. It makes a passing world larger, until putting any one model back makes the robot fail: the
+same search with another predicate, over what is removed.
 
-Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002; but the failing end stays the whole world, as
-in "Debugging Inputs" (Kirschner, Soremekun and Zeller, 2020): else the result would be the difference of two worlds that nobody
-has seen.
+Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002; but the failing
+end stays the whole world, as in "Debugging Inputs" (Kirschner, Soremekun and Zeller, 2020): else
+the result would be the difference of two worlds that nobody has seen.
 """
 
 from __future__ import annotations
@@ -21,10 +22,12 @@ from ddenv.reduction.procedure import NamedClaim, Runs, Work, judge, settled
 from ddenv.reduction.round import Candidate, Partition, Round, Search, Stacks
 from ddenv.reduction.verdict import Verdict
 
-# A world passes if the robot reaches its goal in so many of its runs, and fails in at most this part of those of the whole world.
+# A world passes if the robot reaches its goal in so many of its runs, and fails in at most this
+# part of those of the whole world.
 MOSTLY = 0.9
 FAILURES_LEFT = 0.2
-# The chance that the search takes a world that does not pass, or misses one that does: fresh runs judge the end.
+# The chance that the search takes a world that does not pass, or misses one that does: fresh runs
+# judge the end.
 SEARCH_ERROR = 0.05
 # After this many runs the likelier side counts; fresh runs that do not decide leave it open.
 MOST_RUNS = 60
@@ -34,8 +37,8 @@ MOST_CHECKS = 6
 
 @dataclass(frozen=True)
 class Passing:
-    """The rule by which a world passes: the robot reaches its goal at the rate `wanted`, rather than at `rather_than`, by Wald's
-    sequential test, with this chance of `error` at either rate.
+    """The rule by which a world passes: the robot reaches its goal at the rate `wanted`, rather
+    than at `rather_than`, by Wald's sequential test, with this chance of `error` at either rate.
     """
 
     wanted: float
@@ -58,7 +61,9 @@ class Passing:
         return False
 
     def verdict(self, shown: int, missed: int) -> Verdict:
-        """Of a world in which `shown` runs reached the goal and `missed` did not: "similar" if it passes; "" while it is open."""
+        """Of a world in which `shown` runs reached the goal and `missed` did not: "similar" if it
+        passes; "" while it is open.
+        """
         passes = leans_to(shown, missed, self.wanted, self.rather_than, self.error)
         if passes is None and shown + missed >= MOST_RUNS:
             passes = shown / (shown + missed) > math.sqrt(self.wanted * self.rather_than)
@@ -67,7 +72,9 @@ class Passing:
 
 @dataclass(frozen=True)
 class Each:
-    """The rule where chosen runs are reduced exactly: a world passes if the robot reaches its goal in each of them."""
+    """The rule where chosen runs are reduced exactly: a world passes if the robot reaches its goal
+    in each of them.
+    """
 
     exact: Numbers
 
@@ -86,7 +93,9 @@ class Each:
 
 @dataclass(frozen=True)
 class Checked:
-    """Fresh runs of the world without `removed`, and of it with each model of `removed` put back, showed these claims."""
+    """Fresh runs of the world without `removed`, and of it with each model of `removed` put back,
+    showed these claims.
+    """
 
     removed: Environment
     claims: tuple[NamedClaim, ...]
@@ -98,8 +107,9 @@ class Checked:
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """An isolation: of `whole`, the suspects may go, at first `size` of them; `stacks` has what goes with each. Each check has the
-    error of its number, and begins `block` runs after the one before.
+    """An isolation: of `whole`, the suspects may go, at first `size` of them; `stacks` has what
+    goes with each. Each check has the error of its number, and begins `block` runs after the one
+    before.
     """
 
     whole: Environment
@@ -121,7 +131,9 @@ class Driver(Runs, Protocol):
 def isolation(
     driver: Driver, asked: Asked, checks: Sequence[Checked] = ()
 ) -> Work[Environment | None]:
-    """Returns what has to go so that the robot passes; None if no such world is found. `checks` are known already."""
+    """Returns what has to go so that the robot passes; None if no such world is found. `checks` are
+    known already.
+    """
     checks = list(checks)
     while len(checks) < MOST_CHECKS:
         refuted = {
@@ -140,7 +152,9 @@ def isolation(
 
 
 def _smaller(asked: Asked, check: Checked, refuted: set[Environment]) -> Environment:
-    """What is enough to remove if a check shows that a model may stay; nothing where that was refuted."""
+    """What is enough to remove if a check shows that a model may stay; nothing where that was
+    refuted.
+    """
     needless = next(
         (claim.model for claim in check.claims if claim.claim.verdict == "not needed"), None
     )
@@ -151,7 +165,9 @@ def _smaller(asked: Asked, check: Checked, refuted: set[Environment]) -> Environ
 def _search(
     driver: Runs, asked: Asked, smaller: Environment, refuted: set[Environment]
 ) -> Work[Environment]:
-    """What has to go, by the seeds of the search; nothing if the robot does not pass without all that may go."""
+    """What has to go, by the seeds of the search; nothing if the robot does not pass without all
+    that may go.
+    """
     within = tuple(model for model in asked.suspects if model in smaller)
     searching = ddmin(within) if smaller else isolating(asked.suspects, asked.size)
     algorithm = asked.stacks.expand(searching)
@@ -170,7 +186,9 @@ def _search(
 
 
 def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Work[Checked]:
-    """Fresh runs show whether the world without `removed` passes, and whether it does with each model of it put back."""
+    """Fresh runs show whether the world without `removed` passes, and whether it does with each
+    model of it put back.
+    """
     passing = asked.whole - removed
     error = error_of(number + 1) / 2.0
     backs = {
@@ -185,7 +203,8 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Wor
         (rate,) = yield from settled(driver, runs, lambda _: False, first, "isolate")
         named = [replace(rate, claim=replace(rate.claim, verdict="passes"))]
         for model, with_it in backs.items():
-            # The search has made these runs: the robot misses its goal in one of them if the model is needed.
+            # The search has made these runs: the robot misses its goal in one of them if the model
+            # is needed.
             shown = {run: driver.shown(with_it, run, full=True) for run in rule.exact}
             known = tuple(run for run, one in shown.items() if one is not None)
             missed = False in shown.values()
@@ -212,10 +231,12 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Wor
 
 
 def isolating(suspects: Partition, first: int) -> Search:
-    """What has to go from the whole world; empty if the robot does not pass even without all `suspects`.
+    """What has to go from the whole world; empty if the robot does not pass even without all
+    `suspects`.
 
-    "similar" is a world that passes without a candidate's models. First go the `first` of the suspects, then twice as many,
-    until the robot passes; of those ddmin puts back as many as it can, so that the removal is 1-minimal.
+    "similar" is a world that passes without a candidate's models. First go the `first` of the
+    suspects, then twice as many, until the robot passes; of those ddmin puts back as many as it
+    can, so that the removal is 1-minimal.
     """
     size = max(1, first)
     while suspects:
@@ -242,9 +263,11 @@ def isolating(suspects: Partition, first: int) -> Search:
 
 
 def passes(world: Environment, rule: Passing, at_least: int) -> Procedure:
-    """Whether fresh runs show that `world` passes, from at least so many: "passes", "fails" or "not shown".
+    """Whether fresh runs show that `world` passes, from at least so many: "passes", "fails" or "not
+    shown".
 
-    "passes" is wrong with a probability of at most about the error of the rule: then the rate is no higher than `rather_than`.
+    "passes" is wrong with a probability of at most about the error of the rule: then the rate is no
+    higher than `rather_than`.
     """
     reached = runs = broken = 0
     found: bool | None = None

@@ -1,4 +1,6 @@
-"""The partitioning `learner`: groups models by how likely they are needed, learnt from all tests of this reduction."""
+"""The partitioning `learner`: groups models by how likely they are needed, learnt from all tests of
+this reduction.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,8 @@ from ddenv.text import Names
 
 # After this number of candidates the classifier counts as much as the spatial prior.
 TRUST = 10.0
-# With this sum of weights, -ln(1 - probability), a group contains no needed model with probability one half.
+# With this sum of weights, -ln(1 - probability), a group contains no needed model with probability
+# one half.
 EVEN = float(np.log(2.0))
 # Keeps the classifier's weights small while there are few tests.
 REGULARIZATION = 0.01
@@ -34,19 +37,23 @@ SLOPES = np.array([0.5, 0.75, 1.0, 1.25])
 
 
 class Learner:
-    """A classifier learns from every test of this reduction what needed models look like: near the failure or the path, sensed
-    early, touched, large, slippery, able to move. Its probabilities are calibrated by how often tests showed the failure, and
-    combined with what the tests say about each model itself. Models of similar probability make a partition: few likely ones, or
-    many unlikely ones. Before the first test it uses only the distance to the failure.
+    """A classifier learns from every test of this reduction what needed models look like: near the
+    failure or the path, sensed early, touched, large, slippery, able to move. Its probabilities are
+    calibrated by how often tests showed the failure, and combined with what the tests say about
+    each model itself. Models of similar probability make a partition: few likely ones, or many
+    unlikely ones. Before the first test it uses only the distance to the failure.
 
-    It remembers what it has learnt: one object serves one reduction. Each candidate is one lesson, however many models it left out:
-    removed models were not needed; of the models that a candidate without f left out, at least one is needed.
+    It remembers what it has learnt: one object serves one reduction. Each candidate is one lesson,
+    however many models it left out: removed models were not needed; of the models that a candidate
+    without f left out, at least one is needed.
     """
 
     def __init__(self) -> None:
-        # Logistic regression by stochastic gradient descent: the probability that a model is needed.
+        # Logistic regression by stochastic gradient descent: the probability that a model is
+        # needed.
         self._classifier: SGDClassifier | None = None
-        # The models of the first environment, N in all: their features (N, F) and priors (N,), of a removed one as they were last.
+        # The models of the first environment, N in all: their features (N, F) and priors (N,), of a
+        # removed one as they were last.
         self._columns: dict[str, int] = {}
         self._rows = np.zeros((0, 0))
         self._prior = np.zeros(0)
@@ -64,15 +71,18 @@ class Learner:
         order = np.argsort(chances, kind="stable")
         weights = -np.log1p(-chances[order])
         labels = np.empty(len(environment), dtype=int)
-        # Each group but the last contains no needed model with even odds; the last gets the likeliest. If the total weight is
-        # small, all groups get an equal share of it. A model that would exceed the share begins the next group.
+        # Each group but the last contains no needed model with even odds; the last gets the
+        # likeliest. If the total weight is small, all groups get an equal share of it. A model that
+        # would exceed the share begins the next group.
         share = min(EVEN, float(weights.sum()) / n_partitions)
         before = np.cumsum(weights) - weights
         labels[order] = -np.minimum(np.floor(before / share + 0.5), n_partitions - 1).astype(int)
         return grouped(environment, labels)
 
     def chances(self, environment: Names, evidence: Evidence) -> Floats:
-        """The probability that each model is needed, shape (len(environment),). Learns from the tests since the last call."""
+        """The probability that each model is needed, shape (len(environment),). Learns from the
+        tests since the last call.
+        """
         rows = features(environment, evidence)
         prior = spatial_prior(environment, evidence)
         if not self._columns:
@@ -101,7 +111,9 @@ class Learner:
         return beliefs(sigmoid(slope * logits[here] + shift), groups, evidence.miss_chance)
 
     def _learn(self, here: list[int], evidence: Evidence) -> None:
-        """Learns from the models that went since the last call, and from new candidates without f."""
+        """Learns from the models that went since the last call, and from new candidates without
+        f.
+        """
         there = np.zeros(len(self._columns), dtype=bool)
         there[here] = True
         gone = self._there & ~there
@@ -144,7 +156,9 @@ class Learner:
             self._classifier.partial_fit(samples, labels, classes=[0, 1], sample_weight=weights)
 
     def _classified(self, samples: Floats) -> Floats:
-        """The classifier's probability for each of `samples` (K, F), shape (K,); one half before it has learnt anything."""
+        """The classifier's probability for each of `samples` (K, F), shape (K,); one half before it
+        has learnt anything.
+        """
         known = self._classifier
         return (
             np.full(len(samples), 0.5)
@@ -154,9 +168,11 @@ class Learner:
 
 
 def _scaling(logits: Floats, gone: Floats, groups: Booleans) -> tuple[float, float]:
-    """The slope and shift of all log odds that maximize the likelihood of the tests (Platt scaling, with a weak prior at 1 and 0).
+    """The slope and shift of all log odds that maximize the likelihood of the tests (Platt scaling,
+    with a weak prior at 1 and 0).
 
-    `gone` (G,) are the log odds of models that were not needed; of each row of `groups` (T, M) at least one model is needed.
+    `gone` (G,) are the log odds of models that were not needed; of each row of `groups` (T, M) at
+    least one model is needed.
     """
     slopes, shifts = (grid.ravel() for grid in np.meshgrid(SLOPES, SHIFTS, indexing="ij"))
     spared = -np.logaddexp(0.0, np.outer(logits, slopes) + shifts)
@@ -180,10 +196,12 @@ def sigmoid(logits: Floats) -> Floats:
 
 
 def beliefs(prior: Floats, groups: Booleans, miss_chance: float = 0.0) -> Floats:
-    """The posterior probabilities (M,) of models, once tests have failed to show f without some groups of them.
+    """The posterior probabilities (M,) of models, once tests have failed to show f without some
+    groups of them.
 
-    `groups` (T, M): test t left out the models in row t and did not show f. `miss_chance` is the probability of that if none of
-    them is needed. Loopy belief propagation: each test sends each of its models the odds that no other model explains it.
+    `groups` (T, M): test t left out the models in row t and did not show f. `miss_chance` is the
+    probability of that if none of them is needed. Loopy belief propagation: each test sends each of
+    its models the odds that no other model explains it.
     """
     groups = groups[groups.any(axis=1)]
     if not len(groups):
@@ -203,8 +221,8 @@ def beliefs(prior: Floats, groups: Booleans, miss_chance: float = 0.0) -> Floats
 
 
 def undominated(groups: Booleans) -> Integers:
-    """The rows (K,) of `groups` (T, M) that are not empty and no supersets of another row, which says more; of equal ones the
-    first.
+    """The rows (K,) of `groups` (T, M) that are not empty and no supersets of another row, which
+    says more; of equal ones the first.
     """
     _, firsts = np.unique(groups, axis=0, return_index=True)
     rows = np.sort(firsts[groups[firsts].any(axis=1)])
@@ -215,7 +233,8 @@ def undominated(groups: Booleans) -> Integers:
     return rows[minimal]
 
 
-# Added to distances before their logarithm is taken, so that they do not matter below this scale, m.
+# Added to distances before their logarithm is taken, so that they do not matter below this scale,
+# m.
 NEAR = 0.1
 # The time scale on which early sensing matters, s.
 SOON = 10.0
@@ -224,8 +243,9 @@ SOON = 10.0
 def features(models: Names, evidence: Evidence) -> Floats:
     """The features of `models`, shape (len(models), 9), all of order one; unknown ones are 0.
 
-    Distance to the end of f, mean and minimum distance to the path, how early it was sensed (1 at once, 0 never), whether it was
-    sensed, whether it was touched, size, friction, whether it can move. Raises evidence.Lacking without positions or f's place.
+    Distance to the end of f, mean and minimum distance to the path, how early it was sensed (1 at
+    once, 0 never), whether it was sensed, whether it was touched, size, friction, whether it can
+    move. Raises evidence.Lacking without positions or f's place.
     """
     rows = np.zeros((len(models), 9))
     rows[:, 0] = np.log(NEAR + distances_to_failure(models, evidence))

@@ -1,4 +1,6 @@
-"""The partitionings: how a round splits the environment. One function for each, except for `learner.py`."""
+"""The partitionings: how a round splits the environment. One function for each, except for
+`learner.py`.
+"""
 
 from __future__ import annotations
 
@@ -14,17 +16,17 @@ from ddenv.arrays import Floats
 from ddenv.reduction.evidence import Evidence
 from ddenv.text import Names
 
-# With more clusters or models than this, k-means starts once instead of four times, and with more clusters than this from random
-# models: it would take a second instead of a tenth.
+# With more clusters or models than this, k-means starts once instead of four times, and with more
+# clusters than this from random models: it would take a second instead of a tenth.
 MANY_CLUSTERS = 100
 MANY_MODELS = 500
 MOST_CLUSTERS = 500
 
 
 def model2model(environment: Names, n_partitions: int, evidence: Evidence) -> list[Names]:
-    """Models that are near each other form a partition: k-means clusters their positions into n groups. If a cluster stays empty,
-    because models share a position, each model is its own partition in this round. Good if the models that cause a failure
-    stand close together.
+    """Models that are near each other form a partition: k-means clusters their positions into n
+    groups. If a cluster stays empty, because models share a position, each model is its own
+    partition in this round. Good if the models that cause a failure stand close together.
 
     Paper, Algorithm 2.
     """
@@ -44,33 +46,38 @@ def model2model(environment: Names, n_partitions: int, evidence: Evidence) -> li
 
 
 def timeseg(environment: Names, n_partitions: int, evidence: Evidence) -> list[Names]:
-    """The trajectory of the last similar run is cut into n spans of equal duration. A model belongs to the span whose path is
-    nearest to it. If the robot is stuck for long, many spans lie at that place, so the models there are soon separated from the
-    rest. Good if it matters when the robot met a model.
+    """The trajectory of the last similar run is cut into n spans of equal duration. A model belongs
+    to the span whose path is nearest to it. If the robot is stuck for long, many spans lie at that
+    place, so the models there are soon separated from the rest. Good if it matters when the robot
+    met a model.
     """
     times = evidence.need("trajectory")[:, 0]
     return by_span(environment, np.linspace(times[0], times[-1], n_partitions + 1)[1:-1], evidence)
 
 
 def trajectoryseg(environment: Names, n_partitions: int, evidence: Evidence) -> list[Names]:
-    """The trajectory of the last similar run is cut where the robot's angular velocity changes by more than delta (rad/s, the
-    scenario's key `reduction.delta`). A model belongs to the span whose path is nearest to it. If there are too many
-    cuts, the n - 1 sharpest are kept; if too few, the longest spans are halved. Good if the robot's turns show where something
-    happened.
+    """The trajectory of the last similar run is cut where the robot's angular velocity changes by
+    more than delta (rad/s, the scenario's key `reduction.delta`). A model belongs to the span whose
+    path is nearest to it. If there are too many cuts, the n - 1 sharpest are kept; if too few, the
+    longest spans are halved. Good if the robot's turns show where something happened.
     """
     trajectory = evidence.need("trajectory")
     return by_span(environment, cuts(trajectory, evidence.delta, n_partitions), evidence)
 
 
 def by_span(environment: Names, cuts: Floats, evidence: Evidence) -> list[Names]:
-    """Groups the models by the span of time, between sorted `cuts` (s), in which the robot was nearest to them."""
+    """Groups the models by the span of time, between sorted `cuts` (s), in which the robot was
+    nearest to them.
+    """
     return grouped(
         environment, np.searchsorted(cuts, evidence.nearest(environment)[:, 1], side="left")
     )
 
 
 def cuts(trajectory: Floats, delta: float, n_spans: int) -> Floats:
-    """The times (s) at which the trajectory (N, 5) is cut into `n_spans`, sorted, shape (n_spans - 1,)."""
+    """The times (s) at which the trajectory (N, 5) is cut into `n_spans`, sorted, shape (n_spans -
+    1,).
+    """
     times = trajectory[:, 0]
     lasted = np.diff(trajectory[:, 0])
     turn_rates = np.diff(np.unwrap(trajectory[:, 4])) / np.where(lasted > 0, lasted, np.inf)
@@ -86,7 +93,9 @@ def cuts(trajectory: Floats, delta: float, n_spans: int) -> Floats:
 
 
 def grouped(environment: Names, labels: Iterable[int]) -> list[Names]:
-    """The models of each label, sorted by label; within a partition they keep the environment's order."""
+    """The models of each label, sorted by label; within a partition they keep the environment's
+    order.
+    """
     groups: dict[int, list[str]] = {}
     for name, label in zip(environment, labels, strict=True):
         groups.setdefault(int(label), []).append(name)

@@ -1,4 +1,6 @@
-"""The prioritizations: in which order a round tries its partitions. One function for each; the lowest score is tried first."""
+"""The prioritizations: in which order a round tries its partitions. One function for each; the
+lowest score is tried first.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +15,8 @@ from ddenv.text import Names
 
 
 def failure_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Partitions whose centroid is near the place where the robot failed are tried first. Good if the cause stands where the robot
-    got stuck; it ignores what happened on the way there.
+    """Partitions whose centroid is near the place where the robot failed are tried first. Good if
+    the cause stands where the robot got stuck; it ignores what happened on the way there.
 
     Paper, Algorithm 3. The scores are distances in m.
     """
@@ -23,8 +25,9 @@ def failure_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[fl
 
 
 def avg_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Partitions whose centroid has the smallest mean distance to the robot, over its whole last similar run, are tried first. What
-    disturbed the robot early counts as much as what stood where it failed.
+    """Partitions whose centroid has the smallest mean distance to the robot, over its whole last
+    similar run, are tried first. What disturbed the robot early counts as much as what stood where
+    it failed.
 
     The scores are distances in m.
     """
@@ -32,8 +35,8 @@ def avg_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> 
 
 
 def min_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Partitions whose centroid the robot came nearest to, at any time of its last similar run, are tried first. Models that
-    it only passed count as much as those it failed at.
+    """Partitions whose centroid the robot came nearest to, at any time of its last similar run, are
+    tried first. Models that it only passed count as much as those it failed at.
 
     The scores are distances in m, to the segments of the path.
     """
@@ -42,9 +45,9 @@ def min_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> 
 
 
 def timestep(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Partitions are tried in the order in which the robot first sensed any of their models in its last similar run: by touch, or
-    within the range and the field of view of its sensors. Partitions that it never sensed come last. Good if an early disturbance
-    leads to the failure.
+    """Partitions are tried in the order in which the robot first sensed any of their models in its
+    last similar run: by touch, or within the range and the field of view of its sensors. Partitions
+    that it never sensed come last. Good if an early disturbance leads to the failure.
 
     The scores are in s.
     """
@@ -56,8 +59,9 @@ def timestep(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
 
 
 def sequential(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Partitions are tried in the order in which their first models appear in the world file. It ignores the failure: a
-    yardstick for the schemas that do not, and a good choice if the order of the file means something.
+    """Partitions are tried in the order in which their first models appear in the world file. It
+    ignores the failure: a yardstick for the schemas that do not, and a good choice if the order of
+    the file means something.
 
     The scores are places in the file.
     """
@@ -66,8 +70,8 @@ def sequential(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
 
 
 def random(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Partitions are tried in a random order, fixed by the seed and the round, so that repeated runs use the same order. The
-    baseline that every other prioritization has to beat.
+    """Partitions are tried in a random order, fixed by the seed and the round, so that repeated
+    runs use the same order. The baseline that every other prioritization has to beat.
 
     The scores mean nothing.
     """

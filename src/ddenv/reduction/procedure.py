@@ -1,13 +1,15 @@
 """What ddenv does, from the first run of the whole world to a certified end: one pure coroutine.
 
-It runs nothing itself. It yields the tests that it needs, and goes on once some of them have ended; all else it asks and tells its
-`Driver`. The engine drives it with workers and a run file, `ddenv.reduce` with a function. A resumed run drives it again through
-what is known.
+It runs nothing itself. It yields the tests that it needs, and goes on once some of them have ended;
+all else it asks and tells its `Driver`. The engine drives it with workers and a run file,
+`ddenv.reduce` with a function. A resumed run drives it again through what is known.
 
 1. `baseline`: the whole world is run; its failure is f.
-2. `search_on`: an algorithm yields rounds of candidates. The first one that shows f becomes the environment.
-3. `certify`: fresh runs show whether what is left keeps the rate of f, and that without each model the rate falls.
-4. `onward`: where a claim fails, the search goes back to what is not shown to have lost the rate, or on without a model.
+2. `search_on`: an algorithm yields rounds of candidates. The first one that shows f becomes the
+environment.
+3. `certify`: fresh runs show whether what is left keeps the rate of f, and that without each model
+the rate falls. 4. `onward`: where a claim fails, the search goes back to what is not shown to have
+lost the rate, or on without a model.
 """
 
 from __future__ import annotations
@@ -46,10 +48,12 @@ from ddenv.reduction.verdict import (
     unproven,
 )
 
-# After this many steps back what is left stays as it is, and is not called minimal. Where each of many models takes a bit of the
-# rate, more of them doubled the runs (7,016 to 14,405 of a pile with a rate of .32) and found nothing better.
+# After this many steps back what is left stays as it is, and is not called minimal. Where each of
+# many models takes a bit of the rate, more of them doubled the runs (7,016 to 14,405 of a pile with
+# a rate of .32) and found nothing better.
 MOST_STEPS_BACK = 5
-# In blocks, claims about models begin once so much of the rate is shown to be kept: where f always shows, after 4 of 11 pairs.
+# In blocks, claims about models begin once so much of the rate is shown to be kept: where f always
+# shows, after 4 of 11 pairs.
 LOOKS_KEPT_BOUND = 1 / 3
 # So many blocks decide whether a model is needed, where f shows often with it and never without it.
 ENOUGH_BLOCKS = 20
@@ -61,8 +65,9 @@ Result = TypeVar("Result", covariant=True)
 class Test:
     """Run number `run` of an environment. With `full` it runs to its end, whatever its purpose.
 
-    `why` is "baseline", "round" (for candidate number `candidate`, or None for what is left), "certify" or "isolate"; "hand" and
-    "audit" are tests that the driver makes beside the procedure. `without` is the model that a fresh run leaves out.
+    `why` is "baseline", "round" (for candidate number `candidate`, or None for what is left),
+    "certify" or "isolate"; "hand" and "audit" are tests that the driver makes beside the procedure.
+    `without` is the model that a fresh run leaves out.
     """
 
     environment: Environment
@@ -73,14 +78,15 @@ class Test:
     full: bool = False
 
 
-# Yields the tests that are needed next, in the order in which a single worker would make them, and goes on once some have ended.
+# Yields the tests that are needed next, in the order in which a single worker would make them, and
+# goes on once some have ended.
 Work = Generator[tuple[Test, ...], None, Result]
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """How many of the runs that give the rate showed f, whether several failures competed to be f, and whether all runs show f
-    and have the same bits.
+    """How many of the runs that give the rate showed f, whether several failures competed to be f,
+    and whether all runs show f and have the same bits.
     """
 
     failures: int
@@ -90,18 +96,21 @@ class Baseline:
 
 @dataclass(frozen=True)
 class Past:
-    """A round that was judged before this driver began: its winner's place among the candidates, or None."""
+    """A round that was judged before this driver began: its winner's place among the candidates, or
+    None.
+    """
 
     winner: int | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Leg:
-    """Where a search begins: `chain` leads to the environment that is searched, from the first one to which it may go back. What is
-    left has to keep the rate of f in `whole`.
+    """Where a search begins: `chain` leads to the environment that is searched, from the first one
+    to which it may go back. What is left has to keep the rate of f in `whole`.
 
-    `pinned` models always stay. `free` are the models that may go, each with those that go with it. `rule` says when a candidate
-    is taken. The first round has `n_partitions`, None for the usual number. The groups `again` are left out first.
+    `pinned` models always stay. `free` are the models that may go, each with those that go with it.
+    `rule` says when a candidate is taken. The first round has `n_partitions`, None for the usual
+    number. The groups `again` are left out first.
     """
 
     first_round: int
@@ -116,8 +125,9 @@ class Leg:
 
 @dataclass(frozen=True)
 class Certificate:
-    """The terms of all claims of a certificate together. Its run number 0 has the seed of run `first_run`. With `exact` it claims
-    what these runs of the search show; its fresh runs say how often f shows with other seeds.
+    """The terms of all claims of a certificate together. Its run number 0 has the seed of run
+    `first_run`. With `exact` it claims what these runs of the search show; its fresh runs say how
+    often f shows with other seeds.
     """
 
     first_run: int
@@ -127,8 +137,8 @@ class Certificate:
 
 @dataclass(frozen=True)
 class NamedClaim:
-    """A claim about an environment: what is left, or that without `model`. It rests on the runs `exact` of the search, or on fresh
-    ones.
+    """A claim about an environment: what is left, or that without `model`. It rests on the runs
+    `exact` of the search, or on fresh ones.
     """
 
     model: int | None
@@ -138,7 +148,9 @@ class NamedClaim:
 
     @property
     def runs(self) -> Numbers:
-        """The fresh runs of its environment on which it rests, counted from the certificate's first one."""
+        """The fresh runs of its environment on which it rests, counted from the certificate's first
+        one.
+        """
         return tuple(
             run for environment, run in self.claim.rests_on if environment == self.environment
         )
@@ -146,20 +158,28 @@ class NamedClaim:
 
 @dataclass(frozen=True)
 class Certified:
-    """What fresh runs show of what is left, and then of it without each model, up to a claim that ends the certificate."""
+    """What fresh runs show of what is left, and then of it without each model, up to a claim that
+    ends the certificate.
+    """
 
     certificate: Certificate
     claims: tuple[NamedClaim, ...]
 
 
 class Runs(Protocol):
-    """The runs of one predicate, as far as they are known: what judges candidates and settles claims asks for."""
+    """The runs of one predicate, as far as they are known: what judges candidates and settles
+    claims asks for.
+    """
 
     def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
-        """Whether a run showed what is looked for; None if it has not ended. With `full` only a run to its end counts."""
+        """Whether a run showed what is looked for; None if it has not ended. With `full` only a run
+        to its end counts.
+        """
 
     def refused(self, environment: Environment) -> bool:
-        """Whether the environment is not taken: the user refused it, or it is part of what lost the rate."""
+        """Whether the environment is not taken: the user refused it, or it is part of what lost the
+        rate.
+        """
 
     def refused_by_user(self, environment: Environment) -> bool:
         """Whether the user refused it."""
@@ -173,24 +193,29 @@ class Runs(Protocol):
         """How many tests can be made at the same time."""
 
     def judged(self, index: int, environment: Environment, verdict: str, runs: int) -> None:
-        """Candidate number `index` is "similar", "missed" (by fewer runs than usual), "dissimilar" or "unknown". Its first `runs`
-        runs decided; with none, it is part of what lost the rate.
+        """Candidate number `index` is "similar", "missed" (by fewer runs than usual), "dissimilar"
+        or "unknown". Its first `runs` runs decided; with none, it is part of what lost the rate.
         """
 
 
 class Driver(Runs, Protocol):
-    """What the procedure asks and tells. All answers follow from tests that have ended, and from decisions of the user. Where one
-    of these, or a slice, ends the search, any method may raise `Changed`; it goes on with `next_leg`.
+    """What the procedure asks and tells. All answers follow from tests that have ended, and from
+    decisions of the user. Where one of these, or a slice, ends the search, any method may raise
+    `Changed`; it goes on with `next_leg`.
     """
 
     def rate(self) -> float:
-        """The rate of f in the world in which it was seen, from all of its runs that decisions rest on."""
+        """The rate of f in the world in which it was seen, from all of its runs that decisions rest
+        on.
+        """
 
     def goes_on(self) -> bool:
         """Whether the search goes on by itself where a claim of its certificate fails."""
 
     def baseline_ran(self, runs: int, chose: int) -> Baseline | None:
-        """What these runs of the whole world show, of which the first `chose` only choose f; None: no failure to reduce."""
+        """What these runs of the whole world show, of which the first `chose` only choose f; None:
+        no failure to reduce.
+        """
 
     def failure_fixed(self, runs: int) -> Leg:
         """The baseline of so many runs is over; returns the leg with which the search begins."""
@@ -205,7 +230,9 @@ class Driver(Runs, Protocol):
         """Returns what is known of the round, if it is over already."""
 
     def similar(self, number: int, index: int, environment: Environment) -> bool:
-        """Candidate number `index` of a round can become the environment; returns whether it does."""
+        """Candidate number `index` of a round can become the environment; returns whether it
+        does.
+        """
 
     def round_ended(self, number: int, winner: int | None) -> None:
         """`winner` is the place of the candidate that became the environment."""
@@ -222,8 +249,9 @@ class Driver(Runs, Protocol):
     def stepped_back(
         self, place: int, again: tuple[Partition, ...], tests: tuple[NumberedRun, ...]
     ) -> Leg:
-        """What is left lost the rate, by these fresh tests, as (environment, run): the search goes back to place number `place` of
-        the chain, and leaves out the groups `again` first. The environment at `place` + 1 and all its parts are not taken again.
+        """What is left lost the rate, by these fresh tests, as (environment, run): the search goes
+        back to place number `place` of the chain, and leaves out the groups `again` first. The
+        environment at `place` + 1 and all its parts are not taken again.
         """
 
     def left_out(self, model: int, environment: Environment) -> Leg:
@@ -242,7 +270,9 @@ def procedure(
     leg: Leg | None = None,
     enough_alike: int | None = None,
 ) -> Work[Certified | None]:
-    """The whole reduction, or all from `leg` on. Returns the last certificate; None if there was no failure to reduce."""
+    """The whole reduction, or all from `leg` on. Returns the last certificate; None if there was no
+    failure to reduce.
+    """
     certified = None
     if leg is None:
         leg = yield from baseline(driver, whole, baseline_runs, keeps_rate, enough_alike)
@@ -260,10 +290,12 @@ def procedure(
 def baseline(
     driver: Driver, whole: Environment, runs: int, keeps_rate: bool, enough_alike: int | None = None
 ) -> Work[Leg | None]:
-    """Runs the whole world. To keep the rate of a rare f, it goes on, one run at a time, so that workers change nothing. If the
-    first `enough_alike` runs are alike to the last bit, no more are made.
+    """Runs the whole world. To keep the rate of a rare f, it goes on, one run at a time, so that
+    workers change nothing. If the first `enough_alike` runs are alike to the last bit, no more are
+    made.
 
-    Where several failures competed, the most frequent one was lucky in the runs that chose it: as many others give its rate.
+    Where several failures competed, the most frequent one was lucky in the runs that chose it: as
+    many others give its rate.
     """
     chose = 0
     usual = runs
@@ -325,10 +357,12 @@ def judge(
     why: str,
     usual: Rule | None = None,
 ) -> Work[int | None]:
-    """Tests environments until one is similar by `rule`; returns its place, or None when all are judged.
+    """Tests environments until one is similar by `rule`; returns its place, or None when all are
+    judged.
 
-    Verdicts come in order: tests of later ones that have ended wait. What is dissimilar, but not by the `usual` rule, was
-    missed. Nothing is similar before its first run that showed what is looked for has shown it to its end.
+    Verdicts come in order: tests of later ones that have ended wait. What is dissimilar, but not by
+    the `usual` rule, was missed. Nothing is similar before its first run that showed what is looked
+    for has shown it to its end.
     """
     judged = 0
     refusals = driver.refusals
@@ -378,7 +412,9 @@ def judge(
 
 
 def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Certified]:
-    """Fresh runs show whether what is left keeps the rate of f, and whether it falls without each model."""
+    """Fresh runs show whether what is left keeps the rate of f, and whether it falls without each
+    model.
+    """
     left = chain[-1]
     whole = leg.whole
     while missing := [run for run in leg.rule.exact if driver.shown(left, run) is None]:
@@ -448,7 +484,9 @@ def _settled_in_turn(
 
 
 def _is_minimal_but_for(made: Sequence[NamedClaim]) -> bool:
-    """Whether "minimal but for" some models will be said: the runs chose about which models, so each claim gets a smaller error."""
+    """Whether "minimal but for" some models will be said: the runs chose about which models, so
+    each claim gets a smaller error.
+    """
     verdicts = {one.claim.verdict for one in made}
     return verdicts <= {"kept", "needed", *HELPING} and not verdicts.isdisjoint(HELPING)
 
@@ -460,7 +498,9 @@ def settled(
     first_run: int,
     why: str,
 ) -> Work[tuple[NamedClaim, ...]]:
-    """Makes fresh runs until each of `claims` has a verdict, up to one that `ends` them; returns them."""
+    """Makes fresh runs until each of `claims` has a verdict, up to one that `ends` them; returns
+    them.
+    """
 
     fresh = _fresh(driver, first_run)
     opened: list[tuple[int | None, Environment, Settling]] = []
@@ -507,10 +547,11 @@ def _settled_in_blocks(
     rests: Mapping[int, Environment],
     ends: Callable[[NamedClaim], bool],
 ) -> Work[tuple[NamedClaim, ...]]:
-    """The claims of a certificate without seeds, up to one that `ends` them. One run of `left` serves all claims of its block.
+    """The claims of a certificate without seeds, up to one that `ends` them. One run of `left`
+    serves all claims of its block.
 
-    Models have their turn once it looks as if `left` kept the rate: until then their runs may be for nothing. They have none if the
-    tests that are left decide too little of each.
+    Models have their turn once it looks as if `left` kept the rate: until then their runs may be
+    for nothing. They have none if the tests that are left decide too little of each.
     """
     first_run = certificate.first_run
     terms = certificate.terms
@@ -582,7 +623,9 @@ def _opened(
 def _without_more_runs(
     named: Iterable[NamedClaim], ended: NamedClaim | None
 ) -> tuple[NamedClaim, ...]:
-    """What is said of these claims. To a search that goes on after one `ended`, those that are still open are of no use."""
+    """What is said of these claims. To a search that goes on after one `ended`, those that are
+    still open are of no use.
+    """
     used = (one for one in named if ended is None or one.model in (None, ended.model))
     return tuple(
         one if one.claim.verdict else replace(one, claim=replace(one.claim, verdict="not shown"))
@@ -600,7 +643,9 @@ def _left_of(terms: Terms, made: int) -> float:
 
 
 def _have_turn(of_left: NamedClaim, fresh: ShownIn) -> bool:
-    """Whether what is left is judged, or seems to keep the rate that the search aims at and is shown to keep a part of it."""
+    """Whether what is left is judged, or seems to keep the rate that the search aims at and is
+    shown to keep a part of it.
+    """
     claim = of_left.claim
     if claim.verdict or (claim.bound or 0.0) < LOOKS_KEPT_BOUND:
         return bool(claim.verdict)
@@ -631,9 +676,11 @@ def onward(
 
 
 def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Work[Leg]:
-    """Back to the last environment that is not shown to have lost the rate of all runs of the whole world.
+    """Back to the last environment that is not shown to have lost the rate of all runs of the whole
+    world.
 
-    Only runs by the seeds of this certificate count: by others it was taken, or went back to, which favour it.
+    Only runs by the seeds of this certificate count: by others it was taken, or went back to, which
+    favour it.
     """
     first = certified.certificate.first_run
     terms = certified.certificate.terms
@@ -664,7 +711,9 @@ def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certifie
 
 
 def groups_again(good: Environment, bad: Environment, end: Environment) -> list[Partition]:
-    """What to leave out of `good` at once: all that went after `bad`, then halves of what went from `good` to `bad`."""
+    """What to leave out of `good` at once: all that went after `bad`, then halves of what went from
+    `good` to `bad`.
+    """
     later = tuple(bad - end)
     step = tuple(good - bad)
     halves = [step[: len(step) // 2], step[len(step) // 2 :]] if len(step) > 1 else []
@@ -674,9 +723,11 @@ def groups_again(good: Environment, bad: Environment, end: Environment) -> list[
 def last_good(
     chain: Sequence[Environment], judged: Callable[[Environment], Claim]
 ) -> int | tuple[NumberedRun, ...]:
-    """The place of the last environment of `chain` not shown to have lost the rate, or the tests (models, run) needed to know it.
+    """The place of the last environment of `chain` not shown to have lost the rate, or the tests
+    (models, run) needed to know it.
 
-    `chain` ends with what has lost it; the next one has, too. By bisection: it assumes that the rate falls along the chain.
+    `chain` ends with what has lost it; the next one has, too. By bisection: it assumes that the
+    rate falls along the chain.
     """
     good = 0
     bad = len(chain) - 1

@@ -1,4 +1,6 @@
-"""`ddenv.reduce`: the reduction as a function, for a test of your own. It needs neither Drake nor a robot."""
+"""`ddenv.reduce`: the reduction as a function, for a test of your own. It needs neither Drake nor a
+robot.
+"""
 
 from __future__ import annotations
 
@@ -37,18 +39,20 @@ from ddenv.settings import SETTINGS
 from ddenv.text import Names, count, percent, rounded
 
 NEVER_SHOWS = (
-    "the failure does not show with all elements: in none of {}, so it shows in less than {} % of them (95 %); "
+    "the failure does not show with all elements: in none of {}, so it shows in less than {} % "
+    "of them (95 %); "
     "there is nothing to reduce, unless more baseline_runs show it"
 )
-# Without a word of the user a test is taken to be steady if so many calls with all elements show the
-# failure, and so many with what is left, in addition to the one of the search.
+# Without a word of the user a test is taken to be steady if so many calls with all elements show
+# the failure, and so many with what is left, in addition to the one of the search.
 REPLAYS = 5
 # A test that turns out to be flaky gets so many re-runs.
 FLAKY_ITERATIONS = 3
 # This share of `most_tests` is for the last certificate alone, which has so many tests in any case.
 CERTIFICATE_SHARE = 0.25
 FEWEST_TESTS = 40
-# Runs of certificates are numbered from here on, so that they chose nothing; the search never comes so far.
+# Runs of certificates are numbered from here on, so that they chose nothing; the search never comes
+# so far.
 FIRST_FRESH = 1_000_000
 EACH_CERTIFICATE = 1_000_000
 
@@ -70,8 +74,8 @@ class Step:
 
 @dataclass(frozen=True)
 class NamedRound:
-    """A round, before it is tested: the environment, its parts in the order in which they are tried, and its candidates:
-    "partition" or "complement", and the number of its part.
+    """A round, before it is tested: the environment, its parts in the order in which they are
+    tried, and its candidates: "partition" or "complement", and the number of its part.
     """
 
     environment: Names
@@ -83,12 +87,14 @@ class NamedRound:
 class RateClaim:
     """A claim about what is left, or, if `without` is an element, about that without it.
 
-    `verdict`: what is left is "kept" (it keeps the rate) or "lost"; an element is "needed" (without it the rate falls below what
-    must be kept), "helps" (the failure is rarer without it, but not that rare), "rarer" (by how much is not shown) or "not needed"
-    (it seems to show as often); "not shown" if the runs do not decide.
+    `verdict`: what is left is "kept" (it keeps the rate) or "lost"; an element is "needed" (without
+    it the rate falls below what must be kept), "helps" (the failure is rarer without it, but not
+    that rare), "rarer" (by how much is not shown) or "not needed" (it seems to show as often); "not
+    shown" if the runs do not decide.
 
-    `shown` of `runs` fresh runs showed the failure; `low`..`high` is the 95 % interval of the rate. What is left keeps at least
-    `bound` of the rate of all elements; without an element the failure shows at most `bound` times as often as with it.
+    `shown` of `runs` fresh runs showed the failure; `low`..`high` is the 95 % interval of the rate.
+    What is left keeps at least `bound` of the rate of all elements; without an element the failure
+    shows at most `bound` times as often as with it.
     """
 
     without: str | None
@@ -102,12 +108,15 @@ class RateClaim:
 
 @dataclass(frozen=True, kw_only=True)
 class Reduction:
-    """What `reduce` returns: the elements `kept`, in their order, after `tests` calls of the test in `rounds` rounds.
+    """What `reduce` returns: the elements `kept`, in their order, after `tests` calls of the test
+    in `rounds` rounds.
 
-    `history` begins with all elements; each further step is a reduction, or a step back. With the rule "kept", `claims` say what
-    fresh calls showed, and `minimal` that by these what is kept shows the failure often enough, and that no single element can be
-    left out. Where the test seems to be steady `minimal` rests on two calls of it without each element, and on more without any. It
-    is None with the rule "first", by which one call decides: what a flaky test shows once may be chance.
+    `history` begins with all elements; each further step is a reduction, or a step back. With the
+    rule "kept", `claims` say what fresh calls showed, and `minimal` that by these what is kept
+    shows the failure often enough, and that no single element can be left out. Where the test seems
+    to be steady `minimal` rests on two calls of it without each element, and on more without any.
+    It is None with the rule "first", by which one call decides: what a flaky test shows once may be
+    chance.
 
     `flaky`: calls with the same elements gave different answers.
     """
@@ -158,13 +167,15 @@ def reduce(
     check: bool = True,
     on_round: Callable[[NamedRound], None] | None = None,
 ) -> Reduction:
-    """Finds a few of `elements` with which `test` still shows the failure; the best end is one of which no single one can go.
+    """Finds a few of `elements` with which `test` still shows the failure; the best end is one of
+    which no single one can go.
 
-        ddenv.reduce("abcdef", lambda kept: kept >= {"a", "e"}, algorithm="ddmin").kept  # ("a", "e")
+        ddenv.reduce("abcdef", lambda kept: kept >= {"a", "e"}, algorithm="ddmin").kept  # ("a",
+        "e")
 
-    `test(frozenset of names)` runs the robot, or anything else, with these elements alone, and returns whether the failure showed.
-    A few calls with all elements, and at the end with what is left and without each element of it,
-    show whether the test is steady.
+    `test(frozenset of names)` runs the robot, or anything else, with these elements alone, and
+    returns whether the failure showed. A few calls with all elements, and at the end with what is
+    left and without each element of it, show whether the test is steady.
 
     If it is flaky, or if there are `iterations`, the rule is "kept". All elements are run
     `baseline_runs` times or more, and the search takes what seems to keep `keep_rate` of their
@@ -178,12 +189,14 @@ def reduce(
     With the rule "first" the first call with the failure decides, as in the paper. That is the rule
     if `iterations` are 0, too. `accept_rate` chooses the rule.
 
-    `positions` maps each name to x, y, z (m). `trajectory` (N, 5) is time (s), x, y, z (m), yaw (rad) of the run that failed.
-    `failure_pose` is where it failed, beginning with x, y, z (m); the default is the trajectory's end. `first_sensed` maps names to
-    the time (s) when the robot first sensed them, `traits` to `ddenv.Traits`. Only what the chosen schemas look at is required.
-    `n_partitions` and what follows, to `delta` (rad/s), mean the same as in a scenario's section `reduction`. With `check`, all
-    elements are tested first. `on_round` is called with each round before it is tested. Raises UserError, in one line, for wrong
-    arguments; exceptions of `test` are passed on.
+    `positions` maps each name to x, y, z (m). `trajectory` (N, 5) is time (s), x, y, z (m), yaw
+    (rad) of the run that failed. `failure_pose` is where it failed, beginning with x, y, z (m); the
+    default is the trajectory's end. `first_sensed` maps names to the time (s) when the robot first
+    sensed them, `traits` to `ddenv.Traits`. Only what the chosen schemas look at is required.
+    `n_partitions` and what follows, to `delta` (rad/s), mean the same as in a scenario's section
+    `reduction`. With `check`, all elements are tested first. `on_round` is called with each round
+    before it is tested. Raises UserError, in one line, for wrong arguments; exceptions of `test`
+    are passed on.
     """
     names = _names(elements)
     seems_steady = iterations is None and accept_rate is None
@@ -294,8 +307,8 @@ def reduce(
 
 @dataclass(kw_only=True)
 class _Caller:
-    """Drives the procedure: calls `test` for each test that it wants. With `keep_rate` 0 the first run with the failure decides.
-    `calls` counts them by what they were made for.
+    """Drives the procedure: calls `test` for each test that it wants. With `keep_rate` 0 the first
+    run with the failure decides. `calls` counts them by what they were made for.
     """
 
     names: Names
@@ -347,7 +360,8 @@ class _Caller:
         return sum(self._of_whole) / len(self._of_whole) if self._of_whole else 1.0
 
     def rate(self) -> float:
-        # From the baseline, and from fresh calls up to the first not made: only where what is left missed f they are made.
+        # From the baseline, and from fresh calls up to the first not made: only where what is left
+        # missed f they are made.
         shown = list(self._of_whole)
         for number in range(1, self._certificates + 1):
             first = FIRST_FRESH + number * EACH_CERTIFICATE
@@ -382,15 +396,17 @@ class _Caller:
         return self.left
 
     def search_once(self) -> bool:
-        """Takes the first call with the failure; returns whether the failure was gone without each element that is left."""
+        """Takes the first call with the failure; returns whether the failure was gone without each
+        element that is left.
+        """
         leg = self.next_leg()
         self.carry_out(steps.search_on(self, leg))
         verdicts = (standing([rest], self.shown, leg.rule)[0] for rest in self._removals())
         return all(verdict == ["dissimilar"] for verdict in verdicts)
 
     def search_if_steady(self, check: bool) -> bool | None:
-        """The same where the test shows the failure in each of a few calls with all elements, and gives the same answers again at
-        the end; else None.
+        """The same where the test shows the failure in each of a few calls with all elements, and
+        gives the same answers again at the end; else None.
         """
         if check:
             self.carry_out(
@@ -413,7 +429,9 @@ class _Caller:
         return [self.left - Environment.of((element,)) for element in self.left]
 
     def keep_best(self) -> None:
-        """Goes back from an end that is lost to the smallest one that fresh calls did not show to be."""
+        """Goes back from an end that is lost to the smallest one that fresh calls did not show to
+        be.
+        """
         if self.left in self._shown or not self._shown:
             return
         best = min(self._shown, key=len)
@@ -510,8 +528,10 @@ class _Caller:
         likely = tests_in_blocks(rate, self.certify_rate, len(self.left))
         if LONGER * likely > self.most_tests:
             warnings.warn(
-                f"the failure shows in about {percent(rate)} of the calls: to certify what is left takes "
-                f"about {rounded(likely):,} of them, and most_tests allows {self.most_tests:,}; it may end not shown",
+                f"the failure shows in about {percent(rate)} of the calls: to certify what is "
+                "left takes "
+                f"about {rounded(likely):,} of them, and most_tests allows {self.most_tests:,}; "
+                "it may end not shown",
                 stacklevel=2,
             )
 
@@ -563,7 +583,9 @@ def _wrong(what: str, expected: str, found: object) -> UserError:
 
 
 def _check(**given: Any) -> None:
-    """Raises UserError for a value that the setting of this name cannot have in a scenario either."""
+    """Raises UserError for a value that the setting of this name cannot have in a scenario
+    either.
+    """
     for name, value in given.items():
         one = SETTINGS[name]
         # To repeat runs exactly takes seeds, and `test` has none.
@@ -610,7 +632,9 @@ def _each(
     expected: str,
     read: Callable[[Any], Value | None],
 ) -> dict[str, Value] | None:
-    """What `read` makes of the value of each of `names`, or of all that are there. Raises UserError where it makes nothing."""
+    """What `read` makes of the value of each of `names`, or of all that are there. Raises UserError
+    where it makes nothing.
+    """
     if values is None:
         return None
     if not isinstance(values, Mapping):

@@ -1,5 +1,6 @@
-"""A round: the environment's partitions in the order in which they are tried, and the candidates made from them. And stacks: models
-that rest on each other, as one element of a search, so that whatever is tested has all of a stack or nothing of it.
+"""A round: the environment's partitions in the order in which they are tried, and the candidates
+made from them. And stacks: models that rest on each other, as one element of a search, so that
+whatever is tested has all of a stack or nothing of it.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ Partition = tuple[int, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """A sub-environment to try: "partition" or "complement" of the round's partition number `partition`, which is `part`. `models`
-    are there, `lacks` are those of the environment that are not.
+    """A sub-environment to try: "partition" or "complement" of the round's partition number
+    `partition`, which is `part`. `models` are there, `lacks` are those of the environment that are
+    not.
     """
 
     kind: str
@@ -28,7 +30,8 @@ class Candidate:
 
 @dataclass(frozen=True, kw_only=True)
 class Round:
-    """`partitions` in the order in which they are tried, with the `scores` that rank them. The first similar candidate wins.
+    """`partitions` in the order in which they are tried, with the `scores` that rank them. The
+    first similar candidate wins.
 
     `runs` is how many runs a candidate has if none shows f, None as many as usual.
     """
@@ -62,9 +65,11 @@ def make_round(
     candidates: str = "both",
     complement_order: str = "paper",
 ) -> Round:
-    """A round with the candidates p0, c0, p1, c1, ... of the ranked partitions, without E itself and without repetitions.
+    """A round with the candidates p0, c0, p1, c1, ... of the ranked partitions, without E itself
+    and without repetitions.
 
-    With `complement_order` "far-first" the complements come in the opposite order: the farthest partition is left out first.
+    With `complement_order` "far-first" the complements come in the opposite order: the farthest
+    partition is left out first.
     """
     count = len(ranked)
     order = range(count) if complement_order == "paper" else range(count - 1, -1, -1)
@@ -82,8 +87,8 @@ def round_of(
     ranked: Sequence[tuple[Partition, float]],
     wanted: Iterable[tuple[str, int]],
 ) -> Round:
-    """A round with the candidates `wanted`, as (kind, partition), without E itself, repetitions, and the empty set unless E is a
-    single model.
+    """A round with the candidates `wanted`, as (kind, partition), without E itself, repetitions,
+    and the empty set unless E is a single model.
     """
     partitions, scores = zip(*ranked, strict=True)
     whole = Environment.of(environment)
@@ -120,7 +125,9 @@ def in_order(environment: Partition, partitions: Sequence[Partition], *kinds: st
 
 
 def left_out(group: Partition, environment: Partition) -> Round:
-    """A round with one candidate, E without `group`. The group is the first partition, the rest the second."""
+    """A round with one candidate, E without `group`. The group is the first partition, the rest the
+    second.
+    """
     gone = frozenset(group)
     rest = tuple(model for model in environment if model not in gone)
     ranked = [(part, 0.0) for part in (group, rest) if part]
@@ -129,7 +136,9 @@ def left_out(group: Partition, environment: Partition) -> Round:
 
 @dataclass(frozen=True)
 class Stacks:
-    """The stacks of an environment by their first models, which stand for them, in the order of the world."""
+    """The stacks of an environment by their first models, which stand for them, in the order of the
+    world.
+    """
 
     by_first: dict[int, Environment]
 

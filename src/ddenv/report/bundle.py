@@ -1,4 +1,6 @@
-"""A reproduction to hand over: what is left of a run, with all that makes it fail again on another machine."""
+"""A reproduction to hand over: what is left of a run, with all that makes it fail again on another
+machine.
+"""
 
 from __future__ import annotations
 
@@ -38,9 +40,11 @@ TEMPLATES = Path(__file__).with_name("bundled")
 
 
 def write_bundle(run: Path, target: Path) -> list[Path]:
-    """Writes the bundle of a run to a new folder, or to a new ZIP file by the name's ending; returns what was written.
+    """Writes the bundle of a run to a new folder, or to a new ZIP file by the name's ending;
+    returns what was written.
 
-    Raises UserError, also if `target` exists or if no certificate says how often what is left fails; then nothing is written.
+    Raises UserError, also if `target` exists or if no certificate says how often what is left
+    fails; then nothing is written.
     """
     if target.exists():
         raise UserError(f"{target}: exists already; choose another name")
@@ -99,7 +103,9 @@ def _certified(run: Path) -> Record:
 
 
 def _copy_run(run: Path, target: Path, record: Record) -> None:
-    """A copy with only the trajectories of f and of what the report draws: all would be a hundred times as much."""
+    """A copy with only the trajectories of f and of what the report draws: all would be a hundred
+    times as much.
+    """
     state = record.state
     drawn = {
         test for test in (state.evidence_test, *state.failures, *record.ways) if test is not None

@@ -1,4 +1,6 @@
-"""How sure the result of a run is: its baseline, how its tests ended, the other failures they met, and its fresh runs."""
+"""How sure the result of a run is: its baseline, how its tests ended, the other failures they met,
+and its fresh runs.
+"""
 
 from __future__ import annotations
 
@@ -75,11 +77,15 @@ def _baseline(state: RunState) -> list[Block]:
             say("The baseline has not ended: how often the whole world fails is not known yet.")
         ]
     words = (
-        f"In the whole world the robot {failed_in(state, base)} in {base.failures} of {count(base.runs, 'run')}: "
+        f"In the whole world the robot {failed_in(state, base)} in {base.failures} of "
+        f"{count(base.runs, 'run')}: "
         f"{percent(base.rate)}, 95 % interval {percent(base.low)} to {percent(base.high)}."
     )
     if base.broken:
-        words += f" {count(base.broken, 'more run')} broke, and {'is' if base.broken == 1 else 'are'} not counted."
+        words += (
+            f" {count(base.broken, 'more run')} broke, and {'is' if base.broken == 1 else 'are'} "
+            "not counted."
+        )
     blocks: list[Block] = [say(words)]
     if base.rate < 1:
         blocks.append(say(as_sentence(missed(state))))
@@ -89,7 +95,8 @@ def _baseline(state: RunState) -> list[Block]:
         )
         f = {row for row, one in enumerate(base.seen) if one.test == base.failure_test}
         words = (
-            "The whole world shows several failures. The run began with the one in bold as f; --failure NUMBER reduces "
+            "The whole world shows several failures. The run began with the one in bold as f; "
+            "--failure NUMBER reduces "
             "another one."
         )
         words += (
@@ -125,7 +132,8 @@ def _tests(state: RunState) -> list[Block]:
     # Before the end of the run, anything may still come to be needed.
     ahead = state.ahead if state.status == "finished" else 0
     words = (
-        f"Of these tests {thousands(state.deflake_runs)} were re-runs of candidates whose first test did not show f, and "
+        f"Of these tests {thousands(state.deflake_runs)} were re-runs of candidates whose first "
+        "test did not show f, and "
         f"{thousands(state.cut_tests)} ended early: {WHY}"
     )
     idle = (
@@ -144,7 +152,10 @@ def _slices(state: RunState) -> list[Block]:
             if state.audits
             else ""
         )
-        known = f"{thousands(state.implied)} of the tests were not simulated: finished runs imply them{audits}."
+        known = (
+            f"{thousands(state.implied)} of the tests were not simulated: finished runs imply "
+            f"them{audits}."
+        )
         blocks.append(say(f"{known} {TEACHING}"))
     for node in state.nodes:
         if node.how == "sliced":
@@ -185,7 +196,8 @@ def others_met(record: Record) -> Section | None:
         return None
     tests = count(sum(len(each.tests) for each in found), "test")
     lead = say(
-        f"{count(len(found), 'other failure')} in {tests}, each with the smallest environment that showed it. "
+        f"{count(len(found), 'other failure')} in {tests}, each with the smallest environment "
+        "that showed it. "
         "The workbench reduces any of them in a branch of the run (key f)."
     )
     head = ("failure", "from f's end, m", "tests", "smallest environment", "its models")
@@ -240,9 +252,15 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
         )
         meaning = each.shows if each.claim is None else means(state, found, each.claim)
         rows.append((_name(each), thousands(each.runs), ended, shown, interval, meaning))
-    words = "These runs have seeds that the search did not use, and none of them ended early. Rates exclude broken runs."
+    words = (
+        "These runs have seeds that the search did not use, and none of them ended early. Rates "
+        "exclude broken runs."
+    )
     if found.seeds:
-        words = "What is left ran with seeds that the search did not use; without each model it ran with the chosen seeds."
+        words = (
+            "What is left ran with seeds that the search did not use; without each model it ran "
+            "with the chosen seeds."
+        )
     if state.certified:
         words += f" {as_sentence(promise(state, found))}"
     return [Table(head, rows, {1, 3, 4}, {0}), say(words)]

@@ -67,7 +67,10 @@ def content(record: Record) -> Report:
         lead=(*in_short(record), *damage, _standing(record), *_failure(state)),
         figures=_figures(record),
         sections=tuple(each for each in sections if each is not None),
-        foot=f"{plain(record.path.name)}{when}; {by}report by ddenv {__version__}. Times are in UTC, lengths in m.",
+        foot=(
+            f"{plain(record.path.name)}{when}; {by}report by ddenv {__version__}. Times are in "
+            "UTC, lengths in m."
+        ),
     )
 
 
@@ -80,7 +83,10 @@ def _verdict(state: RunState) -> str:
         return f"None of the {count(whole, 'model')} is needed to make the robot fail"
     if left == whole:
         return f"The robot fails with all {count(left, 'model')}; none has been removed yet"
-    enough = f"{'is' if left == 1 else 'are'} enough to make the robot fail{'' if state.certified else ' so far'}"
+    enough = (
+        f"{'is' if left == 1 else 'are'} enough to make the robot "
+        f"fail{'' if state.certified else ' so far'}"
+    )
     return f"{left} of {whole} models {enough}"
 
 
@@ -111,7 +117,9 @@ def _standing(record: Record) -> Paragraph:
 
 
 def _failure(state: RunState) -> list[Paragraph]:
-    """The scenario in its author's words, how the robot failed in it, and what is wrong with the world."""
+    """The scenario in its author's words, how the robot failed in it, and what is wrong with the
+    world.
+    """
     description = plain(state.scenario.get("description", ""))
     position = state.f_position
     said = [say(description)] if description else []
@@ -153,9 +161,11 @@ def files_of(file: Path) -> list[Path]:
 
 
 def write_report(run: Path, file: Path, force: bool = False) -> list[Path]:
-    """Writes the report on a run as an HTML page or as Markdown, by the ending of `file`; returns the files that were written.
+    """Writes the report on a run as an HTML page or as Markdown, by the ending of `file`; returns
+    the files that were written.
 
-    Markdown has its pictures in files beside it. Raises UserError, also for files that exist, unless `force`.
+    Markdown has its pictures in files beside it. Raises UserError, also for files that exist,
+    unless `force`.
     """
     _check(file)
     report = content(read_run(run))

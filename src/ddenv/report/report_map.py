@@ -1,4 +1,5 @@
-"""The map of a report: the world from above with what is left of it, what was removed, f, and the robot's paths.
+"""The map of a report: the world from above with what is left of it, what was removed, f, and the
+robot's paths.
 
 Its colours are classes of `style.css`, so that it follows the reader's light or dark page.
 """
@@ -34,7 +35,9 @@ LINE = 24.0
 MARKS = {
     "start": badge("start", "S"),
     "goal": badge("goal", "G"),
-    "end": '<path class="ring" d="M-7 -7L7 7M-7 7L7 -7"/><path class="end" d="M-7 -7L7 7M-7 7L7 -7"/>',
+    "end": (
+        '<path class="ring" d="M-7 -7L7 7M-7 7L7 -7"/><path class="end" d="M-7 -7L7 7M-7 7L7 -7"/>'
+    ),
 }
 WORDS = {
     "kept": "left",
@@ -82,8 +85,8 @@ def picture(
 ) -> str:
     """The map of a run as SVG. `name` is different for each map of a page.
 
-    `ways` are paths of the robot in place of those in f and in the last similar run; with `named`, the map has the names of
-    these models, in place of those that are left. `limits` are outlined.
+    `ways` are paths of the robot in place of those in f and in the last similar run; with `named`,
+    the map has the names of these models, in place of those that are left. `limits` are outlined.
     """
     across = WIDTH - LEFT - RIGHT
     # As wide as the page, and never too flat.
@@ -112,7 +115,8 @@ def picture(
         *(f'<path class="{way}" d="{path}"/>' for way, path in drawn.items()),
         *_near(record, frame, places),
     ]
-    # By default what is left has a name, or keeps names away; a name may cover the rest, which is faint.
+    # By default what is left has a name, or keeps names away; a name may cover the rest, which is
+    # faint.
     own = [
         one
         for one in models
@@ -127,7 +131,9 @@ def picture(
 
 
 def _places(record: Record) -> dict[str, Point]:
-    """Where the start, the goal and f's end are, x, y (m), if they are known and not far outside."""
+    """Where the start, the goal and f's end are, x, y (m), if they are known and not far
+    outside.
+    """
     places: dict[str, Point] = {}
     if record.scenario is not None:
         spawn = record.scenario.robot.spawn
@@ -174,7 +180,10 @@ def _near(record: Record, frame: Frame, places: Mapping[str, Point]) -> Iterator
     ):
         if sign in places and 0 < radius < FAR:
             x, y = frame.pixel(places[sign])
-            yield f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{min(FAR, radius * frame.scale):.1f}"/>'
+            yield (
+                f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" '
+                f'r="{min(FAR, radius * frame.scale):.1f}"/>'
+            )
 
 
 def _legend(shown: Sequence[str], top: float) -> Iterator[str]:

@@ -11,7 +11,8 @@ from ddenv.report.run_data import Record
 from ddenv.runfile.state import REFUSED, Round, RunState
 from ddenv.text import count, plain
 
-# Longer tables of rounds and of decisions show only the first and the last rows; of many rounds, only those that reduced.
+# Longer tables of rounds and of decisions show only the first and the last rows; of many rounds,
+# only those that reduced.
 MOST_ROUNDS = 60
 MOST = 120
 
@@ -34,7 +35,10 @@ def _rounds(record: Record) -> list[Block]:
     tests = Counter(
         test.round for test in state.tests if test.phase == "round" and test.is_finished
     )
-    explained = "A round tries one set of models after another; the first one that shows f becomes the environment."
+    explained = (
+        "A round tries one set of models after another; the first one that shows f becomes the "
+        "environment."
+    )
     if any(_tried(each) and not tests[each.number] for each in rounds):
         explained += " Sets judged before are not tested again."
     shown = rounds

@@ -31,13 +31,15 @@ CORNERS = 32
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """A run: its `state`, its `rounds` as they ended, its first settings, and its scenario and world if they can be read.
+    """A run: its `state`, its `rounds` as they ended, its first settings, and its scenario and
+    world if they can be read.
 
-    `started` is the Unix time of the first event, s. `original` is the robot's path in f, `evidence` that on the last similar run:
-    flat rows of `COLUMNS` floats. `troubles` are one line each on what could not be read. `elements` are the models that can be
-    removed, `kept` those of them that are left. `reasons` say what happens without each of these, `nearest`
-    what the nearest world that passes lacks, `changes` what other values of numbers do; `ways` are the robot's paths in the tests
-    that they compare. `models` are those of the world, as they are drawn.
+    `started` is the Unix time of the first event, s. `original` is the robot's path in f,
+    `evidence` that on the last similar run: flat rows of `COLUMNS` floats. `troubles` are one line
+    each on what could not be read. `elements` are the models that can be removed, `kept` those of
+    them that are left. `reasons` say what happens without each of these, `nearest` what the nearest
+    world that passes lacks, `changes` what other values of numbers do; `ways` are the robot's paths
+    in the tests that they compare. `models` are those of the world, as they are drawn.
     """
 
     path: Path
@@ -61,7 +63,9 @@ class Record:
 
 
 def read_run(path: Path) -> Record:
-    """Reads a run file; of a damaged one, as much as is valid. Raises UserError if it is not a run file."""
+    """Reads a run file; of a damaged one, as much as is valid. Raises UserError if it is not a run
+    file.
+    """
     alive = engine_is_alive(path)
     with RunFile(path) as file:
         first, state, rounds, trouble = _story(file)
@@ -103,7 +107,9 @@ def read_run(path: Path) -> Record:
 
 
 def _story(file: RunFile) -> tuple[Recorded | None, RunState, tuple[Round, ...], str]:
-    """The first event, the state at the end or before the first damaged event, every round as it ended, and what is wrong."""
+    """The first event, the state at the end or before the first damaged event, every round as it
+    ended, and what is wrong.
+    """
     first = None
     state = RunState()
     rounds: dict[int, Round] = {}

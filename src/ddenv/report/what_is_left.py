@@ -1,5 +1,6 @@
-"""What is left of the world, on a map and model by model, and why the robot fails: in words and on maps, what happens without each
-model that is left, what the nearest world that passes lacks, and how far numbers may change.
+"""What is left of the world, on a map and model by model, and why the robot fails: in words and on
+maps, what happens without each model that is left, what the nearest world that passes lacks, and
+how far numbers may change.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from ddenv.text import coordinates, count, first_of, plain
 from ddenv.words.claims import rate
 from ddenv.words.margins import HEAD, rows, said
 
-# The maximum number of models in the table and with a sentence, of names in a list, of those that a removal drops, and of maps.
+# The maximum number of models in the table and with a sentence, of names in a list, of those that a
+# removal drops, and of maps.
 MOST_MODELS = 200
 MOST_NAMES = 12
 MOST_DROPPED = 3
@@ -29,7 +31,8 @@ def what_is_left(record: Record) -> Section:
     state = record.state
     title = "The minimal environment" if state.certified else "What is left so far"
     words = (
-        f"The world from above: {count(len(state.environment), 'model')} left, drawn solid; what was removed is faint. "
+        f"The world from above: {count(len(state.environment), 'model')} left, drawn solid; what "
+        "was removed is faint. "
         "The robot's paths in f and in the last similar run."
     )
     left = say(Strong("Left:"), " ", *named(state.environment, MOST_MODELS), ".")
@@ -98,7 +101,10 @@ def why(record: Record) -> Section | None:
     for number, reason in enumerate(record.reasons[:MOST_MODELS]):
         blocks.append(say(plain(f"{sentence(reason)} {parting_sentence(reason)}".rstrip())))
         if record.models and number < MOST_MAPS and reason.parting is not None:
-            words = f"The world from above without {reason.without}: the robot's paths with it and without it"
+            words = (
+                f"The world from above without {reason.without}: the robot's paths with it and "
+                "without it"
+            )
             blocks.append(
                 _map(record, record.kept, reason.gone, reason.parting, f"why{number}", words, None)
             )
@@ -134,7 +140,9 @@ def margins(record: Record) -> Section | None:
 
 
 def _limits(record: Record) -> tuple[Block, Block]:
-    """What is left with the outlines of all limits, and two ways of the smallest change to the goal that can be compared."""
+    """What is left with the outlines of all limits, and two ways of the smallest change to the goal
+    that can be compared.
+    """
     compared = [(one, one.parting) for one in record.changes if one.parting is not None]
     words = "How far each model may move before f disappears."
     ways = {}
@@ -159,7 +167,9 @@ def _map(
     words: str,
     named: Collection[str] | None,
 ) -> Picture:
-    """The world of the models `kept` without those `gone`, with two diverging paths; `named` models bear their names."""
+    """The world of the models `kept` without those `gone`, with two diverging paths; `named` models
+    bear their names.
+    """
     ways = {"with": record.ways[one.with_test], "without": record.ways[one.without_test]}
     drawn = picture(replace(record, kept=kept - frozenset(gone)), name, ways, named)
     return Picture(name, drawn, plain(f"{words}, seed {one.seed}."))

@@ -26,10 +26,11 @@ class Tick(NamedTuple):
 
 @dataclass(frozen=True)
 class Clock:
-    """Time counted in steps of the plant, so that everything happens at the same instants in every run, to the last bit.
+    """Time counted in steps of the plant, so that everything happens at the same instants in every
+    run, to the last bit.
 
-    `step` is in s; `last` is the step at which time is up. `every` has the number of steps between two rows of the recording, two
-    commands, or two readings of a sensor, by the names of `Tick`.
+    `step` is in s; `last` is the step at which time is up. `every` has the number of steps between
+    two rows of the recording, two commands, or two readings of a sensor, by the names of `Tick`.
     """
 
     step: float

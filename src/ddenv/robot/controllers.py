@@ -37,7 +37,8 @@ LONGEST_IMPORT = (
 )
 
 Answer = TypeVar("Answer")
-# Modules loaded from the folder of the last user's controller; another folder may have modules of the same names.
+# Modules loaded from the folder of the last user's controller; another folder may have modules of
+# the same names.
 _brought: set[str] = set()
 
 
@@ -55,10 +56,11 @@ def controllers(settings: Controller, folder: Path) -> Callable[[Setup], Drives]
 def load(
     use: str, folder: Path, key: str = "controller.use", method: str = "step(reading)"
 ) -> Callable[[Any], Any]:
-    """The class that `use` names: `straight`, `costmap`, or `module:Class` with the module in `folder` or installed.
+    """The class that `use` names: `straight`, `costmap`, or `module:Class` with the module in
+    `folder` or installed.
 
-    Raises UserError, which names the scenario's `key`, if there is no such class with this `method`, or if its module cannot be
-    imported.
+    Raises UserError, which names the scenario's `key`, if there is no such class with this
+    `method`, or if its module cannot be imported.
     """
     name, _, attribute = BUILT_IN.get(use, use).partition(":")
     module = (
@@ -161,8 +163,9 @@ class BadCode(UserError):
 class Guarded:
     """The controller that `make(setup)` returns, made at the first step.
 
-    Each call must return within `answer_within` s of real time. Modules that the controller imports late are searched in `folder`
-    first, like its own. What it prints goes to stderr: a program may read stdout.
+    Each call must return within `answer_within` s of real time. Modules that the controller imports
+    late are searched in `folder` first, like its own. What it prints goes to stderr: a program may
+    read stdout.
     """
 
     def __init__(
@@ -180,7 +183,8 @@ class Guarded:
     def step(self, reading: Reading) -> Twist | WheelSpeeds:
         """The command for the next period. Raises BadCode."""
         if self._controller is None:
-            # So that random numbers from the global generators are the same in each repetition of the run.
+            # So that random numbers from the global generators are the same in each repetition of
+            # the run.
             random.seed(self._setup.seed)
             np.random.seed(self._setup.seed % SEEDS)
             self._controller = self._guarded("__init__", self._make, self._setup)
@@ -233,13 +237,15 @@ def _command(answer: Any, joints: tuple[str, ...]) -> Twist | WheelSpeeds:
     speeds = answer.speeds if isinstance(answer, WheelSpeeds) else answer
     if not isinstance(speeds, Mapping):
         raise WrongAnswer(
-            f"returned {_kind(answer)}; expected Twist(speed, turn_rate) or WheelSpeeds(speeds by joint)"
+            f"returned {_kind(answer)}; expected Twist(speed, turn_rate) or WheelSpeeds(speeds "
+            "by joint)"
         )
     for joint in speeds:
         if not isinstance(joint, str) or joint not in joints:
             shown = str(joint)[:80]
             raise WrongAnswer(
-                f"returned a speed for '{shown}'{nearest(shown, joints)}; wheels are {', '.join(joints)}"
+                f"returned a speed for '{shown}'{nearest(shown, joints)}; wheels are "
+                f"{', '.join(joints)}"
             )
     return WheelSpeeds({joint: _number(speed, f"'{joint}'") for joint, speed in speeds.items()})
 
@@ -258,7 +264,8 @@ def _kind(value: Any) -> str:
 
 
 def described(error: BaseException) -> str:
-    """An exception in one line: its type, its text, and the place in the user's code that it came from.
+    """An exception in one line: its type, its text, and the place in the user's code that it came
+    from.
 
     That is the innermost call in the folder of the first file that is not ours.
     """
@@ -281,7 +288,9 @@ class Listener(Protocol):
     """Something that hears a run."""
 
     def begin(self, setup: Setup) -> None:
-        """A run begins; what was heard before it is void, since a run may be made again from its start."""
+        """A run begins; what was heard before it is void, since a run may be made again from its
+        start.
+        """
 
     def hear(self, reading: Reading, command: Twist | WheelSpeeds) -> None:
         """What the controller was given, and its command."""

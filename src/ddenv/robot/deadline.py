@@ -1,4 +1,6 @@
-"""Time limits: real time without the time in which the machine slept or we were stopped; calls of code that is not ours."""
+"""Time limits: real time without the time in which the machine slept or we were stopped; calls of
+code that is not ours.
+"""
 
 from __future__ import annotations
 
@@ -13,17 +15,20 @@ from typing import TypeVar
 Given = TypeVar("Given")
 Answer = TypeVar("Answer")
 
-# The maximum time between two alarms during a call, s: code that catches the interruption and goes on is interrupted again.
+# The maximum time between two alarms during a call, s: code that catches the interruption and goes
+# on is interrupted again.
 ALARM = 0.1
-# The minimum number of alarms before a call is too late. A process that is stopped gets one alarm for all that it missed.
+# The minimum number of alarms before a call is too late. A process that is stopped gets one alarm
+# for all that it missed.
 FEWEST = 10
 
 
 class Stopwatch:
     """Real time in which this process and the machine were at work, s.
 
-    It has to be looked at often. Of the time between two looks at most `longest` s count: it is longer where the process was
-    stopped; while the machine sleeps the clock itself stands still. It starts at `since`, s of `time.monotonic`.
+    It has to be looked at often. Of the time between two looks at most `longest` s count: it is
+    longer where the process was stopped; while the machine sleeps the clock itself stands still. It
+    starts at `since`, s of `time.monotonic`.
     """
 
     def __init__(self, longest: float, since: float | None = None) -> None:
@@ -47,8 +52,9 @@ class TooLate(BaseException):
 def call_within(seconds: float, call: Callable[[Given], Answer], given: Given) -> Answer:
     """Returns `call(given)`. Raises TooLate if that takes longer than `seconds` of real time.
 
-    The call is interrupted only in the main thread, where time in which the process is stopped does not count; in other threads,
-    and in native code, it ends when it ends. It uses SIGALRM: a timer of the code's own ends with the call.
+    The call is interrupted only in the main thread, where time in which the process is stopped does
+    not count; in other threads, and in native code, it ends when it ends. It uses SIGALRM: a timer
+    of the code's own ends with the call.
     """
     if threading.current_thread() is threading.main_thread():
         return _interrupted(seconds, call, given)

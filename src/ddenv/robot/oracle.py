@@ -1,4 +1,6 @@
-"""The failure oracle: how a run failed, and whether it shows f, the failure that is being debugged."""
+"""The failure oracle: how a run failed, and whether it shows f, the failure that is being
+debugged.
+"""
 
 from __future__ import annotations
 
@@ -14,14 +16,14 @@ from ddenv.world.pose import Pose, Vector
 
 LEAN = math.radians(60)  # a robot that leans more than this no longer stands on its wheels, rad
 
-# Descending this far (m) within this time (s) is a fall: 1.7 m/s downwards is faster than wheels descend any slope on which they
-# have grip, and a free fall covers 1.8 m in that time.
+# Descending this far (m) within this time (s) is a fall: 1.7 m/s downwards is faster than wheels
+# descend any slope on which they have grip, and a free fall covers 1.8 m in that time.
 DROP = 1.0
 DROP_SECONDS = 0.6
 SETTLING = 1.0  # a robot may drop onto the ground when a run begins, s
 
-# Within half a robot's length (m) of its end for this time (s). A moving robot leaves such a circle in a second or two; one that
-# rocks back and forth to get free stays.
+# Within half a robot's length (m) of its end for this time (s). A moving robot leaves such a circle
+# in a second or two; one that rocks back and forth to get free stays.
 STILL = 0.5
 STILL_SECONDS = 6.0
 
@@ -29,14 +31,15 @@ STILL_SECONDS = 6.0
 def kind_of(trajectory: Floats, fell: bool, arrived: float | None) -> str:
     """How a run that did not reach its goal failed. `trajectory` (N, 8) is as in `RunResult`.
 
-    `fell` is True if the robot is below everything that it could stand on. `arrived` is the time (s) when its controller first
-    reported that it is at the goal, None if it never did. Returns the first of these that is true:
+    `fell` is True if the robot is below everything that it could stand on. `arrived` is the time
+    (s) when its controller first reported that it is at the goal, None if it never did. Returns the
+    first of these that is true:
 
-    fell         below everything, or more than 1 m down at once and not up again
-    tipped over  at the end it leans more than 60 degrees from how it stood at the start
-    lost         its pose estimate reached the goal, and it was not stuck by then: wheels that spin in a rut also move the estimate
-    stuck        in the last 6 s (or the second half of a shorter run) never more than 0.5 m from its end
-    out of time  still moving
+    fell         below everything, or more than 1 m down at once and not up again tipped over  at
+    the end it leans more than 60 degrees from how it stood at the start lost         its pose
+    estimate reached the goal, and it was not stuck by then: wheels that spin in a rut also move the
+    estimate stuck        in the last 6 s (or the second half of a shorter run) never more than 0.5
+    m from its end out of time  still moving
     """
     times = trajectory[:, 0]
     heights = trajectory[:, 3]
@@ -70,10 +73,12 @@ def _is_still(trajectory: Floats) -> bool:
 
 @dataclass(frozen=True)
 class Failure:
-    """f: where the robot was when its time ran out (`position`, m, world frame), and how it got there.
+    """f: where the robot was when its time ran out (`position`, m, world frame), and how it got
+    there.
 
-    `trajectory` (N, 8) is as in `RunResult`. A run shows f if it ends within `epsilon` (m) of `position` and, with `similarity`
-    "trajectory" instead of "end-pose", is also on average within `epsilon` of the trajectory.
+    `trajectory` (N, 8) is as in `RunResult`. A run shows f if it ends within `epsilon` (m) of
+    `position` and, with `similarity` "trajectory" instead of "end-pose", is also on average within
+    `epsilon` of the trajectory.
     """
 
     position: Vector
@@ -91,7 +96,9 @@ def ends_of(failures: Sequence[Failure]) -> Ends:
 
 @dataclass(frozen=True)
 class Judgement:
-    """`outcome` is "similar", "other", "pass" or "error"; `distance` is that between the ends, m."""
+    """`outcome` is "similar", "other", "pass" or "error"; `distance` is that between the ends,
+    m.
+    """
 
     outcome: str
     distance: float
@@ -104,7 +111,9 @@ def judge(result: RunResult, failure: Failure) -> Judgement:
 
 
 def judge_trajectory(trajectory: Floats, failure: Failure) -> Judgement:
-    """Whether the trajectory (N, 8) of a failed run shows f ("similar") or another failure ("other")."""
+    """Whether the trajectory (N, 8) of a failed run shows f ("similar") or another failure
+    ("other").
+    """
     distance = float(np.linalg.norm(trajectory[-1, 1:4] - failure.position))
     similar = distance <= failure.epsilon
     if similar and failure.similarity == "trajectory":
@@ -113,7 +122,9 @@ def judge_trajectory(trajectory: Floats, failure: Failure) -> Judgement:
 
 
 def trajectory_distance(a: Floats, b: Floats) -> float:
-    """The mean distance of two trajectories (N, 8) at equal times, m. A shorter one, of a run that was cut, waits at its end."""
+    """The mean distance of two trajectories (N, 8) at equal times, m. A shorter one, of a run that
+    was cut, waits at its end.
+    """
     times = np.union1d(a[:, 0], b[:, 0])
     gaps = [
         np.interp(times, a[:, 0], a[:, axis]) - np.interp(times, b[:, 0], b[:, axis])

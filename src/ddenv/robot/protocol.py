@@ -6,7 +6,8 @@ A controller is a class. Each run makes a new one, and asks it for a command onc
         def __init__(self, setup: Setup) -> None: ...
         def step(self, reading: Reading) -> Twist | WheelSpeeds: ...
 
-It may have an attribute `arrived`, True once its pose estimate says that the robot has reached its goal.
+It may have an attribute `arrived`, True once its pose estimate says that the robot has reached its
+goal.
 """
 
 from __future__ import annotations
@@ -27,9 +28,11 @@ STOP = Twist(0.0, 0.0)
 
 
 class Estimate(NamedTuple):
-    """A pose estimate: position (m) and heading (rad in [-pi, pi]) in the world frame, speed forward (m/s), turn rate (rad/s).
+    """A pose estimate: position (m) and heading (rad in [-pi, pi]) in the world frame, speed
+    forward (m/s), turn rate (rad/s).
 
-    `spread` are the standard deviations of x, y (m) and of the heading (rad), as the filter estimates them.
+    `spread` are the standard deviations of x, y (m) and of the heading (rad), as the filter
+    estimates them.
     """
 
     x: float
@@ -52,9 +55,9 @@ class Imu(NamedTuple):
 class Scan:
     """One scan of the lidar, taken at one instant (`time`, s).
 
-    `angles` (N,) rad are the beams' directions in the robot's frame, counterclockwise from its x axis. `ranges` (N,) m are the
-    measured distances, infinite where a beam hit nothing. `origin` (m) is the lidar's position in the frame of the robot's first
-    link.
+    `angles` (N,) rad are the beams' directions in the robot's frame, counterclockwise from its x
+    axis. `ranges` (N,) m are the measured distances, infinite where a beam hit nothing. `origin`
+    (m) is the lidar's position in the frame of the robot's first link.
     """
 
     time: float
@@ -63,7 +66,9 @@ class Scan:
     origin: Vector
 
     def within(self, limits: Floats) -> Floats:
-        """The ranges, infinite where they exceed `limits` (N,) m: then what lies beyond takes no part in the run."""
+        """The ranges, infinite where they exceed `limits` (N,) m: then what lies beyond takes no
+        part in the run.
+        """
         ranges: Floats = np.where(self.ranges <= limits, self.ranges, np.inf)
         return ranges
 
@@ -81,9 +86,10 @@ class Scan:
 class Reading(NamedTuple):
     """What the robot knows at `time` (simulated s).
 
-    `estimate` is the robot's pose estimate, filtered from odometry, IMU and compass. `wheels` (rad/s) are the measured speeds of
-    the wheel joints in the order of `Setup.joints`, positive forward. `compass` (rad) is the heading in the world frame. A
-    sensor that has not measured since the last step is None.
+    `estimate` is the robot's pose estimate, filtered from odometry, IMU and compass. `wheels`
+    (rad/s) are the measured speeds of the wheel joints in the order of `Setup.joints`, positive
+    forward. `compass` (rad) is the heading in the world frame. A sensor that has not measured since
+    the last step is None.
     """
 
     time: float
@@ -98,12 +104,14 @@ class Reading(NamedTuple):
 class Setup:
     """What a controller knows before the run starts.
 
-    The goal is reached within `tolerance` (m) of `goal` (x, y in m, world frame). The robot starts at `start` (x, y in m, heading
-    in rad, world frame). `joints` are the wheel joints, `left` is True for those on the left side; `radius` (m) is the wheels'
-    radius, `track` (m) the distance between left and right ones. `footprint` (m) is how far the robot extends from its origin:
-    ahead, behind, to its left, to its right. `period` (s) is the time between two commands; `speed` (m/s), `acceleration` (m/s^2)
-    and `turn_rate` (rad/s) are limits. `settings` is the scenario's section `controller`, `options` are the scenario's options for
-    a controller of your own. `seed` is the seed of the run.
+    The goal is reached within `tolerance` (m) of `goal` (x, y in m, world frame). The robot starts
+    at `start` (x, y in m, heading in rad, world frame). `joints` are the wheel joints, `left` is
+    True for those on the left side; `radius` (m) is the wheels' radius, `track` (m) the distance
+    between left and right ones. `footprint` (m) is how far the robot extends from its origin:
+    ahead, behind, to its left, to its right. `period` (s) is the time between two commands; `speed`
+    (m/s), `acceleration` (m/s^2) and `turn_rate` (rad/s) are limits. `settings` is the scenario's
+    section `controller`, `options` are the scenario's options for a controller of your own. `seed`
+    is the seed of the run.
     """
 
     goal: Point

@@ -14,7 +14,8 @@ from ddenv.world.pose import Vector
 
 # x, y, z (m), qw, qx, qy, qz.
 PoseRow = tuple[float, float, float, float, float, float, float]
-# Called while a run goes on, with the simulated time (s), the pose of the robot, and the poses of models that can move.
+# Called while a run goes on, with the simulated time (s), the pose of the robot, and the poses of
+# models that can move.
 Progress = Callable[[float, PoseRow, Mapping[str, PoseRow]], None]
 
 
@@ -22,16 +23,18 @@ Progress = Callable[[float, PoseRow, Mapping[str, PoseRow]], None]
 class RunResult:
     """One run of the robot.
 
-    `outcome` is "pass" (goal reached), "failed" or "error" (the simulation broke). `failure` is empty for a pass, one of the words
-    of `kind_of` for a failure, and for an error "not-finite" or the first line of Drake's message.
-    `trajectory` (N, 8) has one row every 0.1 s and one at the end: t (s), x, y, z (m), qw, qx, qy, qz of the robot's first link
-    in the world frame. `motions` holds such rows for each dynamic model that moved.
-    `first_touched` maps a model to the time (s) when the robot first touched it, `first_sensed` to the time when it first had it in
-    view or touched it, which is never later. Models that it never touched or sensed are absent.
-    `cut` is True if the run was cut short: its controller had stopped, and it was at rest well inside or outside epsilon.
-    `took_part` names the models that can have changed a bit of the run; None if that is unknown. A run with the same seed in a
-    world that lacks others, and breaks no tie, repeats every bit of this one. Equal runs name the same models.
-    `taken` names the finished run that implies this one, "" for a run that was made.
+    `outcome` is "pass" (goal reached), "failed" or "error" (the simulation broke). `failure` is
+    empty for a pass, one of the words of `kind_of` for a failure, and for an error "not-finite" or
+    the first line of Drake's message. `trajectory` (N, 8) has one row every 0.1 s and one at the
+    end: t (s), x, y, z (m), qw, qx, qy, qz of the robot's first link in the world frame. `motions`
+    holds such rows for each dynamic model that moved. `first_touched` maps a model to the time (s)
+    when the robot first touched it, `first_sensed` to the time when it first had it in view or
+    touched it, which is never later. Models that it never touched or sensed are absent. `cut` is
+    True if the run was cut short: its controller had stopped, and it was at rest well inside or
+    outside epsilon. `took_part` names the models that can have changed a bit of the run; None if
+    that is unknown. A run with the same seed in a world that lacks others, and breaks no tie,
+    repeats every bit of this one. Equal runs name the same models. `taken` names the finished run
+    that implies this one, "" for a run that was made.
     """
 
     outcome: str
@@ -83,9 +86,10 @@ class Simulator(Protocol):
     ) -> RunResult:
         """Runs the robot in the world with the models `keep`, and with those that always stay.
 
-        `progress(time, pose, models)` gets the simulated time (s), and the poses (x, y, z in m, qw, qx, qy, qz) of the robot and,
-        by name, of the models that can move, at each recorded sample. With `ends` a run may be cut short once the robot is at
-        rest for good and its verdict by these is sure. Raises ValueError for unknown names.
+        `progress(time, pose, models)` gets the simulated time (s), and the poses (x, y, z in m, qw,
+        qx, qy, qz) of the robot and, by name, of the models that can move, at each recorded sample.
+        With `ends` a run may be cut short once the robot is at rest for good and its verdict by
+        these is sure. Raises ValueError for unknown names.
         """
         ...
 

@@ -20,8 +20,9 @@ MOST_NAMES = 3  # a line names so many models
 class Settled:
     """What the models that can move do in `seconds` of simulated time while nobody comes near them.
 
-    `places` are the poses of their links at the end, in the world frame and in the order of the file. `restless` models still
-    move then, `fallen` ones have fallen out of the world. What is `broken` could not be simulated, and has no place.
+    `places` are the poses of their links at the end, in the world frame and in the order of the
+    file. `restless` models still move then, `fallen` ones have fallen out of the world. What is
+    `broken` could not be simulated, and has no place.
     """
 
     seconds: float = 0.0
@@ -52,7 +53,8 @@ def notes_on(world: World, settled: Settled) -> Iterator[tuple[str, str]]:
         farthest = max(ways, key=lambda name: ways[name])
         yield (
             "unrest",
-            f"the world is not at rest at the start: {_do(len(ways), 'moves', 'move')} before the robot arrives, "
+            f"the world is not at rest at the start: {_do(len(ways), 'moves', 'move')} before "
+            "the robot arrives, "
             f"{farthest} by {ways[farthest]:.2f} m; 'ddenv world settle' writes the world at rest",
         )
     for about, names, does, do, why in (

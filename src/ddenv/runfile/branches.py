@@ -1,4 +1,6 @@
-"""The tree of a run's reductions as lines: the path to the current node goes straight down, other branches go to the right."""
+"""The tree of a run's reductions as lines: the path to the current node goes straight down, other
+branches go to the right.
+"""
 
 from __future__ import annotations
 

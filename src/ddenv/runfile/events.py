@@ -1,7 +1,8 @@
 """The events of a run file: what each says, as frozen dataclasses with their units.
 
-Models are numbers into the run's `elements`, environments are numbers into those that `EnvironmentNamed` has, tests count
-from 1. A field with a default may be missing in a file. Times are in s, places in m.
+Models are numbers into the run's `elements`, environments are numbers into those that
+`EnvironmentNamed` has, tests count from 1. A field with a default may be missing in a file. Times
+are in s, places in m.
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ class Event:
 
 
 class Created(Event):
-    """The first event: the scenario as plain data, and the names of all models that may go. In `welds` the first one is welded to
-    the second.
+    """The first event: the scenario as plain data, and the names of all models that may go. In
+    `welds` the first one is welded to the second.
     """
 
     scenario: Data
@@ -54,7 +55,9 @@ class Created(Event):
 
 
 class EngineStarted(Event):
-    """`version` is that of ddenv, `simulator` has those of Drake and numpy, or the oracle, `machine` Python and the processor."""
+    """`version` is that of ddenv, `simulator` has those of Drake and numpy, or the oracle,
+    `machine` Python and the processor.
+    """
 
     pid: Natural
     jobs: Natural
@@ -64,14 +67,18 @@ class EngineStarted(Event):
 
 
 class Cluster(Event):
-    """What has happened to a cluster, in `words`, and how many tests its workers can make at the same time now."""
+    """What has happened to a cluster, in `words`, and how many tests its workers can make at the
+    same time now.
+    """
 
     jobs: Natural
     words: str
 
 
 class Comparing(Event):
-    """A test is made again, because this engine computes with something else than the earlier ones, or as runs must repeat."""
+    """A test is made again, because this engine computes with something else than the earlier ones,
+    or as runs must repeat.
+    """
 
     test: Number
 
@@ -91,7 +98,9 @@ class Resumed(Event):
 
 
 class DiskSpace(Event):
-    """Whether the disk has room for more tests: `needed` bytes; `free` are there. `in_file`: up to the limit of a file's size."""
+    """Whether the disk has room for more tests: `needed` bytes; `free` are there. `in_file`: up to
+    the limit of a file's size.
+    """
 
     enough: bool
     needed: Natural
@@ -100,7 +109,9 @@ class DiskSpace(Event):
 
 
 class ClockJumped(Event):
-    """Unix time went on or back by so many seconds at once: the machine slept, or its clock was set."""
+    """Unix time went on or back by so many seconds at once: the machine slept, or its clock was
+    set.
+    """
 
     seconds: Real
 
@@ -128,12 +139,15 @@ class EngineFailed(Event):
 
 
 class SupportsStarted(Event):
-    """The piles are being settled, to find which models rest on which; only if that takes more than a second."""
+    """The piles are being settled, to find which models rest on which; only if that takes more than
+    a second.
+    """
 
 
 class Supports(Event):
-    """The first model of each pair rests on the second once the whole world has settled; `why` that is unknown. The first model of
-    each tie would move by itself without the second; None if that is unknown.
+    """The first model of each pair rests on the second once the whole world has settled; `why` that
+    is unknown. The first model of each tie would move by itself without the second; None if that is
+    unknown.
     """
 
     pairs: tuple[Pair, ...]
@@ -153,7 +167,9 @@ class Noted(Event):
 
 
 class EnvironmentNamed(Event):
-    """These models are environment number `environment`, from 0; the whole world is number 0 without an event."""
+    """These models are environment number `environment`, from 0; the whole world is number 0
+    without an event.
+    """
 
     environment: Number
     models: Models
@@ -164,9 +180,9 @@ class EnvironmentNamed(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TestStart:
-    """Run number `run` of an environment, with a seed of its own. `phase` says what for: the baseline, a `candidate` of a round,
-    the user's `trial` ("hand"), an audit of a slice, a certificate ("certify": with a fresh seed, `without` a model if it is given)
-    or an isolation.
+    """Run number `run` of an environment, with a seed of its own. `phase` says what for: the
+    baseline, a `candidate` of a round, the user's `trial` ("hand"), an audit of a slice, a
+    certificate ("certify": with a fresh seed, `without` a model if it is given) or an isolation.
     """
 
     test: Number
@@ -187,7 +203,9 @@ class TestStarted(TestStart, Event):
 
 
 class Implied(TestStart, Event):
-    """A test starts and ends at once: the result is that of the test `by`, which has its trajectories."""
+    """A test starts and ends at once: the result is that of the test `by`, which has its
+    trajectories.
+    """
 
     by: Number
 
@@ -195,9 +213,10 @@ class Implied(TestStart, Event):
 class TestFinished(Event):
     """How a test ended; its trajectories stand beside it.
 
-    `distance` is from the robot's end to that of f, m; `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` is a key of `DEEDS`, or
-    why the simulation broke. `first_sensed` and `first_touched` have (model, s). `cut`: it ended early. `took_part` are the models
-    that can have changed a bit of it. `taken` is the run whose result was copied.
+    `distance` is from the robot's end to that of f, m; `end_pose` is x, y, z m, qw, qx, qy, qz.
+    `failure` is a key of `DEEDS`, or why the simulation broke. `first_sensed` and `first_touched`
+    have (model, s). `cut`: it ended early. `took_part` are the models that can have changed a bit
+    of it. `taken` is the run whose result was copied.
     """
 
     test: Number
@@ -222,7 +241,9 @@ class TestLost(Event):
 
 @dataclass(frozen=True, slots=True)
 class Outcomes:
-    """Tests that are judged anew, by their ids: their outcomes, and how far from f they ended, m."""
+    """Tests that are judged anew, by their ids: their outcomes, and how far from f they ended,
+    m.
+    """
 
     outcomes: dict[Natural, Outcome]
     distances: dict[Natural, Real]
@@ -230,8 +251,9 @@ class Outcomes:
 
 @dataclass(frozen=True, slots=True)
 class SeenFailure:
-    """A failure that runs of the whole world showed: in `runs` of them, and `test` is the one in their middle. `kinds` say how the
-    robot failed, the most frequent one first. `position` is where `test` ended, x, y, z m.
+    """A failure that runs of the whole world showed: in `runs` of them, and `test` is the one in
+    their middle. `kinds` say how the robot failed, the most frequent one first. `position` is where
+    `test` ended, x, y, z m.
     """
 
     test: Number
@@ -247,13 +269,15 @@ class SeenFailure:
 class BaselineFinished(Event):
     """f is fixed by the runs of the whole world: `failure_test` is the test whose end is f.
 
-    `failures` of `runs` showed f, at a `rate` of which `low`..`high` is Wilson's 95 % interval; `broken` more broke, and say
-    nothing. The first `chose` runs are not among these: they chose f, which was lucky in them. `seen` are all failures of the runs
-    that chose, the most frequent first, in the numbers of the setting `failure`. `miss_chance` is
-    (1-p)^(1+iterations), the chance that all tests of a candidate miss f; `iterations_95` is the number of iterations for a 95 %
-    chance of seeing f. `position` is f's end, x, y, z m. `wall_limit` is what a later test may take in real time by the speed
-    of these runs, s, None if unknown. It is the one thing here that differs from machine to machine. `alike`: several runs were
-    made, and all of them show f and have the same bits.
+    `failures` of `runs` showed f, at a `rate` of which `low`..`high` is Wilson's 95 % interval;
+    `broken` more broke, and say nothing. The first `chose` runs are not among these: they chose f,
+    which was lucky in them. `seen` are all failures of the runs that chose, the most frequent
+    first, in the numbers of the setting `failure`. `miss_chance` is (1-p)^(1+iterations), the
+    chance that all tests of a candidate miss f; `iterations_95` is the number of iterations for a
+    95 % chance of seeing f. `position` is f's end, x, y, z m. `wall_limit` is what a later test may
+    take in real time by the speed of these runs, s, None if unknown. It is the one thing here that
+    differs from machine to machine. `alike`: several runs were made, and all of them show f and
+    have the same bits.
     """
 
     runs: Natural
@@ -286,8 +310,9 @@ class BaselineFinished(Event):
 
 
 class LegStarted(Event):
-    """A search starts from the current environment, with round number `round`. Its first round has `n_partitions`, None for the
-    scenario's. It keeps `keep_rate` of the `rate`; with 0 the first run with f decides.
+    """A search starts from the current environment, with round number `round`. Its first round has
+    `n_partitions`, None for the scenario's. It keeps `keep_rate` of the `rate`; with 0 the first
+    run with f decides.
     """
 
     round: Number
@@ -296,8 +321,8 @@ class LegStarted(Event):
 
 
 class RoundStarted(Event):
-    """An environment is split into partitions; candidates are "partition" or "complement", the number of the partition, and the
-    distance that ranks it, m, if it is one.
+    """An environment is split into partitions; candidates are "partition" or "complement", the
+    number of the partition, and the distance that ranks it, m, if it is one.
     """
 
     round: Number
@@ -311,8 +336,9 @@ class RoundStarted(Event):
 
 
 class Forecast(Event):
-    """How many more tests of candidates a search of so many models takes, low, likely and high, when `tests_done` were finished. In
-    one case of ten fewer than the low number are left, in one of ten more than the high one.
+    """How many more tests of candidates a search of so many models takes, low, likely and high,
+    when `tests_done` were finished. In one case of ten fewer than the low number are left, in one
+    of ten more than the high one.
     """
 
     round: Number
@@ -329,7 +355,9 @@ class OfCandidate:
 
 
 class CandidateJudged(OfCandidate, Event):
-    """The verdict on a candidate, by these tests. Earlier versions also wrote how many were `known` before."""
+    """The verdict on a candidate, by these tests. Earlier versions also wrote how many were `known`
+    before.
+    """
 
     verdict: Annotated[str, OneOf("similar", "missed", "dissimilar", "unknown")]
     tests: tuple[Number, ...]
@@ -360,7 +388,9 @@ class RoundFinished(Event):
 
 
 class Sliced(Event):
-    """The environment is cut down to what took part in these tests. `audit`: one of them is simulated there, too."""
+    """The environment is cut down to what took part in these tests. `audit`: one of them is
+    simulated there, too.
+    """
 
     environment: Natural
     tests: tuple[Number, ...]
@@ -369,8 +399,8 @@ class Sliced(Event):
 
 
 class SlicesRefuted(Event):
-    """The audit `test` does not repeat the test `by`, which implies it. Slices are no longer used, implied tests are void, and the
-    run goes back to a node.
+    """The audit `test` does not repeat the test `by`, which implies it. Slices are no longer used,
+    implied tests are void, and the run goes back to a node.
     """
 
     test: Number
@@ -379,8 +409,8 @@ class SlicesRefuted(Event):
 
 
 class EarlyStopEnded(Event):
-    """From here on all tests run to their end: the tests that led to what a `certificate` refutes ended early; or the test `by`
-    shows to its end another verdict than `test`, which ended early.
+    """From here on all tests run to their end: the tests that led to what a `certificate` refutes
+    ended early; or the test `by` shows to its end another verdict than `test`, which ended early.
     """
 
     certificate: Number | None = None
@@ -392,10 +422,12 @@ class EarlyStopEnded(Event):
 
 
 class CertificateStarted(Event):
-    """Full runs with fresh seeds follow, from run number `run` on. They have to show that what is left keeps `certify_rate` of the
-    rate of f, which was estimated as `rate`; the search aimed at `keep_rate`. Before there was a `certify_rate`, they were one.
+    """Full runs with fresh seeds follow, from run number `run` on. They have to show that what is
+    left keeps `certify_rate` of the rate of f, which was estimated as `rate`; the search aimed at
+    `keep_rate`. Before there was a `certify_rate`, they were one.
 
-    With `seeds`, on which what is left shows f, chosen runs were reduced exactly, and fresh ones only say how often f shows.
+    With `seeds`, on which what is left shows f, chosen runs were reduced exactly, and fresh ones
+    only say how often f shows.
     """
 
     certificate: Number
@@ -410,11 +442,13 @@ class CertificateStarted(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClaimMade:
-    """A claim about an environment: about what is left, or, if `without` is a model, about that without it.
+    """A claim about an environment: about what is left, or, if `without` is a model, about that
+    without it.
 
-    `shown` of `runs` showed f, `low`..`high` is their interval; `outcomes` counts all of them. What is left keeps at least `bound`
-    of the rate; without a model f shows at most `bound` times as often as with it. A claim about the runs themselves, not about a
-    rate, has their share as both ends of the interval.
+    `shown` of `runs` showed f, `low`..`high` is their interval; `outcomes` counts all of them. What
+    is left keeps at least `bound` of the rate; without a model f shows at most `bound` times as
+    often as with it. A claim about the runs themselves, not about a rate, has their share as both
+    ends of the interval.
     """
 
     without: Natural | None
@@ -443,8 +477,9 @@ class ClaimMade:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EndsElsewhere:
-    """Of the ends of f, `whole` of `of_whole` in the baseline are in a group, and `left` of `of_left` fresh ones of what is left.
-    Other groups are `apart` from it, m; an `epsilon` that tells them apart, m.
+    """Of the ends of f, `whole` of `of_whole` in the baseline are in a group, and `left` of
+    `of_left` fresh ones of what is left. Other groups are `apart` from it, m; an `epsilon` that
+    tells them apart, m.
     """
 
     apart: Positive
@@ -456,7 +491,9 @@ class EndsElsewhere:
 
 
 class CertificateFinished(Event):
-    """What fresh runs show; the claims rest on these tests. `elsewhere`: what is left ends elsewhere within epsilon."""
+    """What fresh runs show; the claims rest on these tests. `elsewhere`: what is left ends
+    elsewhere within epsilon.
+    """
 
     claims: tuple[ClaimMade, ...]
     tests: tuple[Number, ...]
@@ -464,8 +501,8 @@ class CertificateFinished(Event):
 
 
 class RateLost(Event):
-    """The run goes back to `node`, since what is left lost the rate; the node `lost` after it is not taken again. The groups
-    `again` are left out at once, or in halves.
+    """The run goes back to `node`, since what is left lost the rate; the node `lost` after it is
+    not taken again. The groups `again` are left out at once, or in halves.
     """
 
     node: Natural
@@ -475,7 +512,9 @@ class RateLost(Event):
 
 
 class LeftOut(Event):
-    """A certificate showed that a model is not needed; `by_user`: that it only helps, and the user left it out."""
+    """A certificate showed that a model is not needed; `by_user`: that it only helps, and the user
+    left it out.
+    """
 
     without: Natural
     environment: Natural
@@ -487,11 +526,13 @@ class LeftOut(Event):
 
 
 class IsolationStarted(Event):
-    """The fewest models are sought that have to go from the whole world so that the robot reaches its goal.
+    """The fewest models are sought that have to go from the whole world so that the robot reaches
+    its goal.
 
-    Fresh runs begin at number `run`; each check has `block` of them. A world passes at the rate `wanted` rather than `rather_than`.
-    The `suspects` go first to last, at first `size` of them. `before` is why the reduction had ended. With `chosen` runs a world
-    passes if the robot reaches its goal in each of them, and fresh runs only say how often it does.
+    Fresh runs begin at number `run`; each check has `block` of them. A world passes at the rate
+    `wanted` rather than `rather_than`. The `suspects` go first to last, at first `size` of them.
+    `before` is why the reduction had ended. With `chosen` runs a world passes if the robot reaches
+    its goal in each of them, and fresh runs only say how often it does.
     """
 
     isolation: Number
@@ -518,7 +559,9 @@ class RemovalJudged(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReturnedMade:
-    """A claim of a check: about a world that passes, or, if `back` is a model, about that with it put back."""
+    """A claim of a check: about a world that passes, or, if `back` is a model, about that with it
+    put back.
+    """
 
     back: Natural | None
     verdict: Annotated[
@@ -553,9 +596,10 @@ class IsolationGivenUp(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NumberAsked:
-    """A number of the world or of the scenario, such as "barrel_02.y": its value `now`, and the `low`est and `high`est to try. A
-    change is measured as a share of `scale`; less than `resolution` does not matter. All are in `unit`, "" for a plain number.
-    Numbers that are changed `together`, in %, have each a name, the present value and that at 100 %.
+    """A number of the world or of the scenario, such as "barrel_02.y": its value `now`, and the
+    `low`est and `high`est to try. A change is measured as a share of `scale`; less than
+    `resolution` does not matter. All are in `unit`, "" for a plain number. Numbers that are changed
+    `together`, in %, have each a name, the present value and that at 100 %.
     """
 
     name: str
@@ -569,9 +613,10 @@ class NumberAsked:
 
 
 class MarginsStarted(Event):
-    """A search for how far each of the `numbers` may change in an environment where f shows at `rate`, with at most `budget` runs.
-    Each verdict on a value is wrong with a probability of at most `error`. `certified`: fresh runs have shown the rate. `status`
-    and `before` are how the reduction stood, and why.
+    """A search for how far each of the `numbers` may change in an environment where f shows at
+    `rate`, with at most `budget` runs. Each verdict on a value is wrong with a probability of at
+    most `error`. `certified`: fresh runs have shown the rate. `status` and `before` are how the
+    reduction stood, and why.
     """
 
     numbers: tuple[NumberAsked, ...]
@@ -585,7 +630,9 @@ class MarginsStarted(Event):
 
 
 class MarginRan(Event):
-    """How a run ended in which the number `name` had a `value`; outcome, failure, distance and end as in `TestFinished`."""
+    """How a run ended in which the number `name` had a `value`; outcome, failure, distance and end
+    as in `TestFinished`.
+    """
 
     name: str
     value: Real
@@ -667,7 +714,9 @@ class Adopted(Event):
 
 
 class AcceptedOther(Event):
-    """The failure of a test counts as f from here on; `what` names it. `instead`: in a branch, in place of what was f."""
+    """The failure of a test counts as f from here on; `what` names it. `instead`: in a branch, in
+    place of what was f.
+    """
 
     test: Number
     what: str
@@ -678,7 +727,9 @@ class AcceptedOther(Event):
 
 
 class WentBack(Event):
-    """A node is the current one again; `rejected` is the node that is undone. `judged` if other failures count as f there."""
+    """A node is the current one again; `rejected` is the node that is undone. `judged` if other
+    failures count as f there.
+    """
 
     node: Natural
     rejected: Natural | None = None
@@ -686,7 +737,9 @@ class WentBack(Event):
 
 
 class Changed(Event):
-    """New values of settings. Where they say anew which failures are the same, `baseline` is fixed again, and judges all tests."""
+    """New values of settings. Where they say anew which failures are the same, `baseline` is fixed
+    again, and judges all tests.
+    """
 
     settings: Data
     baseline: BaselineFinished | None = None

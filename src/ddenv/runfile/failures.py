@@ -1,5 +1,5 @@
-"""Which runs show the same failure; and the failures other than f that tests of a run met: grouped by end and kind, each with the
-smallest environment that showed it.
+"""Which runs show the same failure; and the failures other than f that tests of a run met: grouped
+by end and kind, each with the smallest environment that showed it.
 """
 
 from __future__ import annotations
@@ -16,13 +16,15 @@ from ddenv.runfile.events import Place
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 
-# Tests grouped at a time: the first ones find the centres of frequent failures, and most of the later ones are close to these.
+# Tests grouped at a time: the first ones find the centres of frequent failures, and most of the
+# later ones are close to these.
 CHUNK = 400
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OtherFailure:
-    """A failure f' that `tests` showed, in order. `position` (x, y, z m) is the end in their middle.
+    """A failure f' that `tests` showed, in order. `position` (x, y, z m) is the end in their
+    middle.
 
     `smallest` is the first of the tests with the fewest models, `size` the number of these.
     """
@@ -84,11 +86,13 @@ def _by_end(ends: list[tuple[int, Place]], epsilon: float) -> Iterable[tuple[Pla
 
 
 def grouped(number: int, apart: Callable[[int, int], float | None]) -> list[list[int]]:
-    """Runs 0 to `number` - 1 in groups that show the same failure; in each group its centre is the first.
+    """Runs 0 to `number` - 1 in groups that show the same failure; in each group its centre is the
+    first.
 
-    `apart(i, j)` is how far apart two ends are (m), None if they show different failures; it is asked once for each pair i < j. The
-    first centre is the run that shares its failure with most others (ties: with the least sum of distances to these, then the
-    earliest), and its group are these; the next one is found in the same way among the rest.
+    `apart(i, j)` is how far apart two ends are (m), None if they show different failures; it is
+    asked once for each pair i < j. The first centre is the run that shares its failure with most
+    others (ties: with the least sum of distances to these, then the earliest), and its group are
+    these; the next one is found in the same way among the rest.
     """
     near: dict[int, dict[int, float]] = {one: {} for one in range(number)}
     for first, second in combinations(range(number), 2):
@@ -110,7 +114,9 @@ def grouped(number: int, apart: Callable[[int, int], float | None]) -> list[list
 
 
 def alike(ends: list[Place], epsilon: float) -> list[list[int]]:
-    """The ends (m) in groups around centres, as `grouped` has them: an end belongs to a centre within `epsilon` (m)."""
+    """The ends (m) in groups around centres, as `grouped` has them: an end belongs to a centre
+    within `epsilon` (m).
+    """
 
     def apart(first: int, second: int) -> float | None:
         distance = math.dist(ends[first], ends[second])

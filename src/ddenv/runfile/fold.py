@@ -1,6 +1,7 @@
 """Folds events into the state of a run. Pure: `apply(state, recorded)` returns the next state.
 
-What each event changes stands here and in the files `fold_*.py` beside this one, a function for each.
+What each event changes stands here and in the files `fold_*.py` beside this one, a function for
+each.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ JUDGED = ("similar", "missed", "dissimilar", "unknown")
 
 
 def fold(recorded: Iterable[Recorded], state: RunState | None = None) -> RunState:
-    """The state after these events, from the beginning or from an earlier `state`. Raises UserError for invalid ones."""
+    """The state after these events, from the beginning or from an earlier `state`. Raises UserError
+    for invalid ones.
+    """
     return reduce(apply, recorded, state or RunState())
 
 
@@ -67,7 +70,9 @@ def apply(state: RunState, recorded: Recorded) -> RunState:
 def steps(
     events: Iterable[Recorded], state: RunState | None = None
 ) -> Iterator[tuple[Recorded, RunState, RunState]]:
-    """(event, before, after) for each event, from the beginning or from an earlier `state`. Raises UserError at an invalid one."""
+    """(event, before, after) for each event, from the beginning or from an earlier `state`. Raises
+    UserError at an invalid one.
+    """
     after = state or RunState()
     for recorded in events:
         before = after
@@ -102,11 +107,13 @@ def created(state: RunState, event: e.Created, _: float) -> Changes:
     }
 
 
-# The engine, and for how long it works: no pause counts, nor the time in which a reduction waits for the user or for the disk.
+# The engine, and for how long it works: no pause counts, nor the time in which a reduction waits
+# for the user or for the disk.
 
 
 def engine_started(state: RunState, event: e.EngineStarted, at: float) -> Changes:
-    # Tests that broke are made again; verdicts that rest on them may change, so the search starts again.
+    # Tests that broke are made again; verdicts that rest on them may change, so the search starts
+    # again.
     anew = state.left_unknown and state.baseline is not None
     return {
         # A killed engine wrote no end: it worked at least until its last event.
@@ -145,7 +152,9 @@ def _ended(state: RunState, status: str, reason: str, at: float) -> Changes:
 
 
 def engine_stopped(state: RunState, event: e.EngineStopped, at: float) -> Changes:
-    """An isolation, or a search for margins, that is stopped leaves the reduction before it as it was."""
+    """An isolation, or a search for margins, that is stopped leaves the reduction before it as it
+    was.
+    """
     if state.isolating is not None or state.margining is not None:
         return _as_it_was(state, at)
     return _ended(state, "stopped", event.reason, at)
@@ -268,7 +277,9 @@ def round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
 
 
 def forecast(state: RunState, event: e.Forecast, _: float) -> Changes:
-    """A search is foretold anew in each round: each forecast narrows the one before, unless they contradict each other."""
+    """A search is foretold anew in each round: each forecast narrows the one before, unless they
+    contradict each other.
+    """
     if list(event.tests) != sorted(event.tests):
         raise ValueError(event.tests)
     low, likely, high = event.tests
@@ -415,8 +426,8 @@ def _described(state: RunState, candidate: Candidate) -> str:
     return f"{candidate.label} of round {current(state).number} ({count(candidate.size, 'model')})"
 
 
-# By its name in a file each event has a function, here or in a file beside this one, or stands below. Each returns only the changed
-# fields, so that the state is copied once per event.
+# By its name in a file each event has a function, here or in a file beside this one, or stands
+# below. Each returns only the changed fields, so that the state is copied once per event.
 _HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
     e.KINDS[name]: function
     for place in (globals(), *map(vars, (fold_tests, fold_decisions, fold_claims)))

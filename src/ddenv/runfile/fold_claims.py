@@ -153,7 +153,9 @@ def _open(state: RunState) -> Isolation:
 
 
 def margins_started(state: RunState, event: e.MarginsStarted, _: float) -> Changes:
-    """Numbers that were asked for before keep their runs, as long as they are about the same models."""
+    """Numbers that were asked for before keep their runs, as long as they are about the same
+    models.
+    """
     names = tuple(asked.name for asked in event.numbers)
     sound = all(one.low <= one.now <= one.high and one.low < one.high for one in event.numbers)
     if (
@@ -216,7 +218,8 @@ def sliced(state: RunState, event: e.Sliced, at: float) -> Changes:
 def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes:
     """An implied test, simulated after all, does not have the bits of the run that implies it.
 
-    The results of all implied tests are void. The run goes back to the last environment that rests on none.
+    The results of all implied tests are void. The run goes back to the last environment that rests
+    on none.
     """
     audit = state.test(event.test)
     node = state.nodes[event.node]

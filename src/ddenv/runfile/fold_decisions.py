@@ -1,4 +1,6 @@
-"""Folds the user's decisions: pins, selections tried by hand, changed settings, going back and branches; and each arrival."""
+"""Folds the user's decisions: pins, selections tried by hand, changed settings, going back and
+branches; and each arrival.
+"""
 
 from __future__ import annotations
 
@@ -77,7 +79,9 @@ def adopted(state: RunState, event: e.Adopted, at: float) -> Changes:
 
 
 def accepted_other(state: RunState, event: e.AcceptedOther, at: float) -> Changes:
-    """Another failure counts as f from now on, and the environment that showed it becomes the current one."""
+    """Another failure counts as f from now on, and the environment that showed it becomes the
+    current one.
+    """
     test = state.test(event.test)
     # A trial has a number; otherwise `what` names the candidate.
     trial = None if event.trial is None else state.trials[event.trial - 1]
@@ -161,7 +165,9 @@ def changed(state: RunState, event: e.Changed, at: float) -> Changes:
 
 
 def with_settings(scenario: Data, new: Mapping[str, Any]) -> Data:
-    """A scenario as plain data with new values of settings. Raises KeyError for a setting that there is not."""
+    """A scenario as plain data with new values of settings. Raises KeyError for a setting that
+    there is not.
+    """
     sections = {SETTINGS[name].section for name in new}
     return scenario | {
         section: scenario[section]
@@ -171,7 +177,9 @@ def with_settings(scenario: Data, new: Mapping[str, Any]) -> Data:
 
 
 def _judged_anew(state: RunState, baseline: e.BaselineFinished, at: float) -> Changes:
-    """Other runs show f now, so the search begins from the whole world again; tests keep their ends."""
+    """Other runs show f now, so the search begins from the whole world again; tests keep their
+    ends.
+    """
     changes = left_round(state)
     changes |= baseline_finished(state.changed(**changes), baseline, at)
     state = state.changed(**changes)
@@ -216,7 +224,9 @@ def arrived(
     tests: Iterable[int],
     below: int = -1,
 ) -> Changes:
-    """The run moves to environment `number`, a new node below the current one, or below node number `below`; `tests` ran it."""
+    """The run moves to environment `number`, a new node below the current one, or below node number
+    `below`; `tests` ran it.
+    """
     environment = state.environments[number].names(state.elements)
     reduction = state.scenario.get("reduction", {})
     runs, shown = seen(state.tests, tests)
@@ -281,7 +291,9 @@ def refused(state: RunState, environment: Environment, verdict: str, round: int 
 
 
 def failures_at(state: RunState, number: int) -> Numbers:
-    """The tests whose failures count as f in a node: that of f in its branch, and those accepted on the way from there."""
+    """The tests whose failures count as f in a node: that of f in its branch, and those accepted on
+    the way from there.
+    """
     way = path(state.nodes, number)
     first = origin(state, number)
     counted = (node for node in way[way.index(first) :] if node is first or node.how == "accepted")
@@ -289,13 +301,17 @@ def failures_at(state: RunState, number: int) -> Numbers:
 
 
 def origin(state: RunState, number: int) -> Node:
-    """Where f in a node was seen first: the whole world, or the start of a branch that reduces another failure."""
+    """Where f in a node was seen first: the whole world, or the start of a branch that reduces
+    another failure.
+    """
     way = path(state.nodes, number)
     return next((node for node in reversed(way) if node.how == "instead"), way[0])
 
 
 def exact_runs(state: RunState) -> Numbers:
-    """The runs that `accept_rate: exact` reduces: the first ones that showed f where it was seen. None with other rules."""
+    """The runs that `accept_rate: exact` reduces: the first ones that showed f where it was seen.
+    None with other rules.
+    """
     asked = settings(state)
     whole = origin(state, state.node).id
     if asked.accept_rate != "exact":
@@ -307,7 +323,9 @@ def exact_runs(state: RunState) -> Numbers:
 
 
 def stands_for_all(state: RunState) -> bool:
-    """Whether a single run is reduced exactly that has the same bits with any seed, as far as the baseline shows."""
+    """Whether a single run is reduced exactly that has the same bits with any seed, as far as the
+    baseline shows.
+    """
     return state.baseline is not None and state.baseline.alike and settings(state).reduces_one_run
 
 

@@ -1,4 +1,6 @@
-"""Folds tests: what each ran and how it ended, how often f showed in each environment, and the baseline."""
+"""Folds tests: what each ran and how it ended, how often f showed in each environment, and the
+baseline.
+"""
 
 from __future__ import annotations
 
@@ -200,7 +202,8 @@ def _noted(state: RunState, test: Test) -> Changes:
     round = state.round
     here = state.here
     if test.phase == CERTIFY:
-        # Beside what is left, the whole world runs where that missed f, which would show its rate as too low.
+        # Beside what is left, the whole world runs where that missed f, which would show its rate
+        # as too low.
         beside = test.node != state.node and state.nodes[test.node].how in ("start", "instead")
         node = None if beside or test.without is not None else state.nodes[test.node]
     elif (
@@ -224,7 +227,9 @@ def same_runs(state: RunState, test: Test) -> Numbers:
 
 
 def seen(tests: Sequence[Test], ids: Iterable[int]) -> tuple[Numbers, int]:
-    """Those of some tests that ended and did not break, each once, and how many of them showed f."""
+    """Those of some tests that ended and did not break, each once, and how many of them showed
+    f.
+    """
     sound = tuple(
         id for id in dict.fromkeys(ids) if 0 < id <= len(tests) and tests[id - 1].is_sound
     )
@@ -246,7 +251,9 @@ def with_trial(state: RunState, trial: Trial) -> Changes:
 
 
 def tried(state: RunState, event: e.OfCandidate) -> Candidate:
-    """The candidate that an event is about. Raises IndexError or ValueError if it is none of the current round."""
+    """The candidate that an event is about. Raises IndexError or ValueError if it is none of the
+    current round.
+    """
     return candidate_of(state, event.round, event.candidate)
 
 

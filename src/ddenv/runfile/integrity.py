@@ -22,9 +22,9 @@ MOST_FAULTS = 3
 
 @dataclass(frozen=True)
 class Whole:
-    """The events of a run file that make sense, from the first one on; `trouble` says what is wrong with the next, "" if none is.
-    `events` counts them, `state` is what they come to. So many of the tests are `bare`: they have no trajectory, as in a recorded
-    run that was made small.
+    """The events of a run file that make sense, from the first one on; `trouble` says what is wrong
+    with the next, "" if none is. `events` counts them, `state` is what they come to. So many of the
+    tests are `bare`: they have no trajectory, as in a recorded run that was made small.
     """
 
     events: int
@@ -44,7 +44,9 @@ def faults(file: RunFile) -> list[str]:
 
 
 def whole(file: RunFile, keep: Callable[[Recorded], None] = lambda _: None) -> Whole:
-    """How much of the run can be used. Calls `keep` with each event that makes sense, up to the first one that does not."""
+    """How much of the run can be used. Calls `keep` with each event that makes sense, up to the
+    first one that does not.
+    """
     state = RunState()
     count = 0
     bare = 0
@@ -64,9 +66,11 @@ def whole(file: RunFile, keep: Callable[[Recorded], None] = lambda _: None) -> W
 
 
 def rescue(file: RunFile, copy: Path) -> Whole:
-    """Writes the events that make sense, with their trajectories, to a new run file; returns what is in it.
+    """Writes the events that make sense, with their trajectories, to a new run file; returns what
+    is in it.
 
-    Raises UserError if `copy` exists or cannot be written, or if even the world of the run cannot be read.
+    Raises UserError if `copy` exists or cannot be written, or if even the world of the run cannot
+    be read.
     """
     if copy.exists():
         raise UserError(f"{copy}: exists already; choose another name for the copy")
@@ -77,7 +81,8 @@ def rescue(file: RunFile, copy: Path) -> Whole:
         first = None
     if first is None or not isinstance(first.event, Created):
         raise UserError(
-            f"{file.path}: nothing can be repaired: its first event, or its world and settings, are lost"
+            f"{file.path}: nothing can be repaired: its first event, or its world and settings, "
+            "are lost"
         )
     try:
         with tempfile.TemporaryDirectory(prefix=f".{copy.name}.", dir=copy.parent) as folder:

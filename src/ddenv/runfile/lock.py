@@ -1,4 +1,6 @@
-"""Lets only one engine work on a run: a lock on a file beside it, which the system releases however the engine ends."""
+"""Lets only one engine work on a run: a lock on a file beside it, which the system releases however
+the engine ends.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ def _lock_path(run: Path) -> Path:
 
 @contextmanager
 def engine_lock(run: Path, taken: str = "") -> Iterator[None]:
-    """Holds the run's lock. Raises UserError, with the words `taken` if there are any, if another engine holds it."""
+    """Holds the run's lock. Raises UserError, with the words `taken` if there are any, if another
+    engine holds it.
+    """
     taken = (
         taken
         or f"{run}: another engine is working on this run; attach to it with 'ddenv open {run}'"
@@ -39,7 +43,9 @@ def engine_lock(run: Path, taken: str = "") -> Iterator[None]:
 
 
 def mode_beside(run: Path) -> int:
-    """The mode of files beside a run: its own, which is the user's alone until the user opens it to others."""
+    """The mode of files beside a run: its own, which is the user's alone until the user opens it to
+    others.
+    """
     try:
         return stat.S_IMODE(run.stat().st_mode) & 0o666
     except OSError:
@@ -48,7 +54,9 @@ def mode_beside(run: Path) -> int:
 
 @contextmanager
 def held(lock: Path, taken: str, refused: str, instead: str, mode: int = OWN) -> Iterator[None]:
-    """Holds the file `lock`. Raises UserError: `taken` if another process holds it, `refused` if it cannot be made or locked."""
+    """Holds the file `lock`. Raises UserError: `taken` if another process holds it, `refused` if it
+    cannot be made or locked.
+    """
     if fcntl is None:
         raise UserError(
             f"{refused}: this system has no file locks; use Linux or macOS, or WSL on Windows"

@@ -1,4 +1,6 @@
-"""A position in the events of a run: at its end, or at any earlier moment. Views, playback and lessons move it alike."""
+"""A position in the events of a run: at its end, or at any earlier moment. Views, playback and
+lessons move it alike.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +14,8 @@ from typing import Literal, get_args
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Recorded
 
-# What a step goes to: the next event that a viewer sees; the end of the next chapter; the next reduction; the next verdict or
-# decision of the user.
+# What a step goes to: the next event that a viewer sees; the end of the next chapter; the next
+# reduction; the next verdict or decision of the user.
 ChapterKind = Literal["baseline", "round", "certificate"]
 Step = Literal["moment", "round", "reduction", "decision"]
 # A state is kept of one in so many events.
@@ -33,8 +35,9 @@ _VERDICTS = ("candidate_judged", "trial_judged", "certificate_finished")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chapter:
-    """The baseline, a round or a certificate: `kind` with its `number`. It has events from `first` to `last`, begins with `models`
-    and ends with `left` of them. `tests` were finished when it began.
+    """The baseline, a round or a certificate: `kind` with its `number`. It has events from `first`
+    to `last`, begins with `models` and ends with `left` of them. `tests` were finished when it
+    began.
     """
 
     kind: ChapterKind
@@ -56,9 +59,10 @@ class Moment:
 
 
 class Position:
-    """Finds the state at any event quickly, from states that it keeps of some of them. `read(after, most)` returns events with an
-    id above `after`, as `RunFile.events` does. Each event is noted once, in order: by the one who folds them, or by `catch_up`.
-    Event ids stand for positions; `at` is None at the end, also while it grows.
+    """Finds the state at any event quickly, from states that it keeps of some of them. `read(after,
+    most)` returns events with an id above `after`, as `RunFile.events` does. Each event is noted
+    once, in order: by the one who folds them, or by `catch_up`. Event ids stand for positions; `at`
+    is None at the end, also while it grows.
     """
 
     def __init__(self, read: Callable[[int, int], list[Recorded]]) -> None:
@@ -178,7 +182,9 @@ class Position:
         self.at = None if id is None or id >= self._ids[-1] else self._ids[max(1, place)]
 
     def step(self, what: Step, by: int) -> bool:
-        """Goes to the next of these (`by` 1) or to the one before (-1); False if there is none. After the last comes the end."""
+        """Goes to the next of these (`by` 1) or to the one before (-1); False if there is none.
+        After the last comes the end.
+        """
         stops = self.stops(what)
         here = self._ids[-1] if self.at is None else self.at
         if by > 0:
@@ -208,7 +214,9 @@ def position_in(events: Sequence[Recorded]) -> Position:
 
 
 def _goes_on(chapter: Chapter, state: RunState) -> bool:
-    """Whether the run is still in its last chapter: what a chapter showed is gone once the run goes elsewhere."""
+    """Whether the run is still in its last chapter: what a chapter showed is gone once the run goes
+    elsewhere.
+    """
     if chapter.kind == "round":
         return (
             state.round is not None

@@ -1,4 +1,6 @@
-"""Dataclasses as plain data and back: what a file says is checked against each field's annotation, and what is wrong is named."""
+"""Dataclasses as plain data and back: what a file says is checked against each field's annotation,
+and what is wrong is named.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,8 @@ from annotated_types import Interval
 
 from ddenv.environment import Environment
 
-# No robot comes so far, no test takes so long, and no run counts so far (m, s). Squares of these are still numbers.
+# No robot comes so far, no test takes so long, and no run counts so far (m, s). Squares of these
+# are still numbers.
 LARGEST = 1e15
 # The maximum number of digits of an environment: a million models.
 DIGITS = 250_000
@@ -26,7 +29,9 @@ Pose = tuple[Real, Real, Real, Real, Real, Real, Real]
 
 
 class Invalid(ValueError):
-    """A value is not what its field may have; the message says which field, what it should be, and what was found."""
+    """A value is not what its field may have; the message says which field, what it should be, and
+    what was found.
+    """
 
 
 class OneOf:

@@ -1,4 +1,6 @@
-"""A run as a view sees it at one moment: its state, whether an engine works on it, and where the robots are."""
+"""A run as a view sees it at one moment: its state, whether an engine works on it, and where the
+robots are.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +20,12 @@ EngineIs = Literal["alive", "starting", "absent"]
 class Snapshot:
     """All that the run screen shows at one moment.
 
-    `engine` is "alive", "starting" or "absent". `evidence` is the robot's path on the last similar run, `original` its path in f
-    itself: flat rows of `COLUMNS` floats. `spent` is the time engines have worked on the run, s. `error` says why the run file
-    cannot be read. `gone` says that it was deleted or replaced: the rest is what was read last.
-    `behind` says that not all of it was read yet. `past`: it is an earlier moment of the run, `pointed` the candidate of that
-    moment, and `happened` says what happened there. `version` is the one of the program that looks.
+    `engine` is "alive", "starting" or "absent". `evidence` is the robot's path on the last similar
+    run, `original` its path in f itself: flat rows of `COLUMNS` floats. `spent` is the time engines
+    have worked on the run, s. `error` says why the run file cannot be read. `gone` says that it was
+    deleted or replaced: the rest is what was read last. `behind` says that not all of it was read
+    yet. `past`: it is an earlier moment of the run, `pointed` the candidate of that moment, and
+    `happened` says what happened there. `version` is the one of the program that looks.
     """
 
     state: RunState = field(default_factory=RunState)
@@ -41,7 +44,9 @@ class Snapshot:
 
     @property
     def older_engine(self) -> str:
-        """The version of the run's last engine, if it is another version than this program's; otherwise "", or if unknown."""
+        """The version of the run's last engine, if it is another version than this program's;
+        otherwise "", or if unknown.
+        """
         return (
             self.state.engine_version if self.version not in ("", self.state.engine_version) else ""
         )
@@ -56,7 +61,9 @@ class Snapshot:
 
     @property
     def running(self) -> tuple[Test, ...]:
-        """The tests that run now, in the order they were started; none when no engine is there to run them."""
+        """The tests that run now, in the order they were started; none when no engine is there to
+        run them.
+        """
         return self.state.running_tests if self.engine == "alive" or self.past else ()
 
     @property

@@ -1,5 +1,6 @@
-"""The state of a run at one moment: plain frozen data, folded from the run's events by `ddenv.runfile.fold`. And what makes that
-cheap: a tuple whose changed copies share all but one small part with the original.
+"""The state of a run at one moment: plain frozen data, folded from the run's events by
+`ddenv.runfile.fold`. And what makes that cheap: a tuple whose changed copies share all but one
+small part with the original.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
     from ddenv.runfile.events import BaselineFinished, EarlyStopEnded, Forecast, Place
     from ddenv.runfile.progress import Certificate, Decision, Leg, Point, Refusal, Removal
 
-# Items in a chunk. A change copies one chunk and the list of chunks; for the longest runs (60,000 tests) both are about as long.
+# Items in a chunk. A change copies one chunk and the list of chunks; for the longest runs (60,000
+# tests) both are about as long.
 CHUNK = 256
 
 Item = TypeVar("Item")
@@ -25,9 +27,9 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True, slots=True)
 class PersistentTuple(Sequence[Item]):
-    """An immutable sequence: `added` and `changed` return a new one that shares all unchanged chunks. A slice is a plain tuple. It
-    equals other ones with equal items, but no plain tuple. All chunks but the last hold `CHUNK` items, so equal items are always in
-    equal chunks.
+    """An immutable sequence: `added` and `changed` return a new one that shares all unchanged
+    chunks. A slice is a plain tuple. It equals other ones with equal items, but no plain tuple. All
+    chunks but the last hold `CHUNK` items, so equal items are always in equal chunks.
     """
 
     chunks: tuple[tuple[Item, ...], ...] = ()
@@ -45,7 +47,9 @@ class PersistentTuple(Sequence[Item]):
         return PersistentTuple((*self.chunks[:-1], (*self.chunks[-1], item)))
 
     def changed(self, index: int, item: Item) -> PersistentTuple[Item]:
-        """One with `item` at `index`, which may be negative. Raises IndexError if there is no such index."""
+        """One with `item` at `index`, which may be negative. Raises IndexError if there is no such
+        index.
+        """
         number, place = divmod(range(len(self))[index], CHUNK)
         # Joined slices would be copied twice.
         chunk = list(self.chunks[number])
@@ -55,7 +59,9 @@ class PersistentTuple(Sequence[Item]):
         return PersistentTuple(tuple(chunks))
 
     def changed_since(self, earlier: PersistentTuple[Item]) -> Iterator[Item]:
-        """The items that differ from `earlier` at their index, in order; shared chunks cost nothing."""
+        """The items that differ from `earlier` at their index, in order; shared chunks cost
+        nothing.
+        """
         for number, chunk in enumerate(self.chunks):
             before = earlier.chunks[number] if number < len(earlier.chunks) else ()
             if chunk is not before:
@@ -98,10 +104,12 @@ REFUSED = ("vetoed", "rejected", "undone")
 # Other outcomes of tests; a baseline run may also be "failed" until f is fixed.
 UNFINISHED = ("running", "lost")
 _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
-# The phase of full runs of what is left with fresh seeds, and of runs of the whole world without the models of a removal.
+# The phase of full runs of what is left with fresh seeds, and of runs of the whole world without
+# the models of a removal.
 CERTIFY = "certify"
 ISOLATE = "isolate"
-# The first run with a fresh seed; the search never comes so far. A certificate has so many seeds, or more if it is asked for more.
+# The first run with a fresh seed; the search never comes so far. A certificate has so many seeds,
+# or more if it is asked for more.
 FIRST_FRESH_RUN = 10_000
 FRESH_RUNS = 1000
 
@@ -110,33 +118,34 @@ FRESH_RUNS = 1000
 class RunState:
     """A whole run. `status`:
 
-    created    no engine has worked on it yet
-    baseline   the whole world is being run
-    running    rounds are being tested
-    paused     no new tests are started
-    waiting    a reduction (`waiting_candidate` of the current round) waits for accept or reject
-    finished   the run ended by itself: `minimal` says whether no model can be removed, `reason` why it ended
-    stopped    the engine was stopped and can be resumed
-    failed     the engine could not continue: `reason` says why
+    created    no engine has worked on it yet baseline   the whole world is being run running
+    rounds are being tested paused     no new tests are started waiting    a reduction
+    (`waiting_candidate` of the current round) waits for accept or reject finished   the run ended
+    by itself: `minimal` says whether no model can be removed, `reason` why it ended stopped    the
+    engine was stopped and can be resumed failed     the engine could not continue: `reason` says
+    why
 
-    `confirming`: the rounds are over, and full runs with fresh seeds show what the result is worth: the last of `certificates`;
-    `fresh` are the ids of its tests. The run came to `node` when `came_at` tests were finished. Once `search_due`, a new `leg` has
-    to begin. `judged` are the tests that verdicts rest on, in their order. `refused` environments are not taken because the user
-    said so, `lost` ones with all of their parts because they lost the rate of f, each beside the failures that counted as f then:
-    the search went so many `steps_back`, and leaves out the groups `again` first in the next leg. The ends of the tests in
-    `failures` count as f in the current node. `lower_bound` is the minimum number of models needed, if f shows wherever everything
-    it needs is present.
-    `supports`, `welds` and `ties` have (model, other): it rests on the other once the whole world has settled (found while
-    `settling`; `unsettled` says why it could not be), is welded to it by the files, or tied to it; `ties` are None if unknown.
-    Of the tests, `implied` ones were not simulated, and `audits` were although they were implied;
-    decisions rest on those with the bits 1 << id of `rests_on`. Those up to `mixed_until` were computed with something else, and
-    imply nothing now. If one of these, the first of `refuted`, did not repeat the second, slices are no longer used.
-    Since `early_stop_ended` all tests run to their end.
-    `engines` counts the engines that have worked on it. After one broke tests that a verdict needs (`left_unknown`), the next one
-    makes them again. `notes` say what is wrong with the whole world: a word and a sentence each. `refusal` is the last command
-    that the engine could not obey, with the reason. `needs_room` is how many bytes have to be free on the disk before more tests
-    start; where the `file_is_full`, below the limit of a file's size. `working_seconds` is the time that ended engines have worked;
-    `started_at` (Unix time, s) is set while one works.
+    `confirming`: the rounds are over, and full runs with fresh seeds show what the result is worth:
+    the last of `certificates`; `fresh` are the ids of its tests. The run came to `node` when
+    `came_at` tests were finished. Once `search_due`, a new `leg` has to begin. `judged` are the
+    tests that verdicts rest on, in their order. `refused` environments are not taken because the
+    user said so, `lost` ones with all of their parts because they lost the rate of f, each beside
+    the failures that counted as f then: the search went so many `steps_back`, and leaves out the
+    groups `again` first in the next leg. The ends of the tests in `failures` count as f in the
+    current node. `lower_bound` is the minimum number of models needed, if f shows wherever
+    everything it needs is present. `supports`, `welds` and `ties` have (model, other): it rests on
+    the other once the whole world has settled (found while `settling`; `unsettled` says why it
+    could not be), is welded to it by the files, or tied to it; `ties` are None if unknown. Of the
+    tests, `implied` ones were not simulated, and `audits` were although they were implied;
+    decisions rest on those with the bits 1 << id of `rests_on`. Those up to `mixed_until` were
+    computed with something else, and imply nothing now. If one of these, the first of `refuted`,
+    did not repeat the second, slices are no longer used. Since `early_stop_ended` all tests run to
+    their end. `engines` counts the engines that have worked on it. After one broke tests that a
+    verdict needs (`left_unknown`), the next one makes them again. `notes` say what is wrong with
+    the whole world: a word and a sentence each. `refusal` is the last command that the engine could
+    not obey, with the reason. `needs_room` is how many bytes have to be free on the disk before
+    more tests start; where the `file_is_full`, below the limit of a file's size. `working_seconds`
+    is the time that ended engines have worked; `started_at` (Unix time, s) is set while one works.
     """
 
     revision: int = 0
@@ -209,7 +218,8 @@ class RunState:
 
     def changed(self, **values: Any) -> RunState:
         """A copy with new values of these fields."""
-        # `dataclasses.replace` would pass all fields through the constructor, and double the cost of an event.
+        # `dataclasses.replace` would pass all fields through the constructor, and double the cost
+        # of an event.
         state = object.__new__(RunState)
         state.__dict__.update(self.__dict__, **values)
         return state
@@ -290,7 +300,9 @@ class RunState:
 
     @property
     def certificate(self) -> Certificate | None:
-        """The last certificate, if it is one of the current environment and no search began since."""
+        """The last certificate, if it is one of the current environment and no search began
+        since.
+        """
         return next(
             (one for one in self.certificates[-1:] if one.node == self.node and not one.past), None
         )
@@ -304,7 +316,9 @@ class RunState:
 
     @property
     def isolated(self) -> Isolation | None:
-        """The last isolation that has come to its end: all that is known of the nearest world that passes."""
+        """The last isolation that has come to its end: all that is known of the nearest world that
+        passes.
+        """
         return next((one for one in reversed(self.isolations) if one.ended), None)
 
     @property
@@ -358,8 +372,9 @@ class RunState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Round:
-    """One round: `partitions` in the order they are tried, and without how many parts f was `missed`. `winner` is the index of the
-    candidate that became the environment, `accepted` that of one that the user accepted, or None.
+    """One round: `partitions` in the order they are tried, and without how many parts f was
+    `missed`. `winner` is the index of the candidate that became the environment, `accepted` that of
+    one that the user accepted, or None.
     """
 
     number: int
@@ -382,9 +397,10 @@ class Round:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Split:
-    """An environment and its disjoint parts, shared by all candidates of a round; by name, and as `whole` and `parts` by number.
-    `pinned` models of the environment are in no part, but in every candidate. `letters` has the number of each part's letter: a
-    part that was one in the round before keeps its letter.
+    """An environment and its disjoint parts, shared by all candidates of a round; by name, and as
+    `whole` and `parts` by number. `pinned` models of the environment are in no part, but in every
+    candidate. `letters` has the number of each part's letter: a part that was one in the round
+    before keeps its letter.
     """
 
     environment: Names
@@ -408,12 +424,14 @@ class Split:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """A sub-environment to try. `kind` is "partition" or "complement" of partition number `partition` of `split`.
+    """A sub-environment to try. `kind` is "partition" or "complement" of partition number
+    `partition` of `split`.
 
-    `verdict` is "" while open, then "similar", "missed" (it missed f in a few tests; the algorithm may come back to it),
-    "dissimilar", "unknown" (its tests broke), "vetoed", "rejected" (similar, but the user rejected it) or "undone" (the user took
-    it back before). `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None. `tests` are
-    the ids of its tests so far, including re-runs and tests of earlier rounds.
+    `verdict` is "" while open, then "similar", "missed" (it missed f in a few tests; the algorithm
+    may come back to it), "dissimilar", "unknown" (its tests broke), "vetoed", "rejected" (similar,
+    but the user rejected it) or "undone" (the user took it back before). `distance` is what the
+    prioritization ranked its partition by (m for the proximal ones), or None. `tests` are the ids
+    of its tests so far, including re-runs and tests of earlier rounds.
     """
 
     index: int
@@ -457,8 +475,9 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """A sub-environment selected by the user. `models` are the ones it keeps of the whole world; it was tried in `node`. `verdict`
-    and `tests` are as in a candidate. `adopted`: it became the environment.
+    """A sub-environment selected by the user. `models` are the ones it keeps of the whole world; it
+    was tried in `node`. `verdict` and `tests` are as in a candidate. `adopted`: it became the
+    environment.
     """
 
     number: int
@@ -483,11 +502,12 @@ class Trial:
 class Test:
     """Run number `run` of environment number `environment`, with its seed.
 
-    What an event says of it is as in `TestStarted` and `TestFinished`. `outcome` is "running" until it ends; a baseline run that
-    failed is "failed" until f is fixed. `node` was the current one; for a fresh run it is the last one on the way there with its
-    environment. In a round, a `run` above 0 is a re-run (deflaking). `removal` is the number of the removal in whose world it ran.
-    `implied_by`: it was not simulated, since that test implies it; `audits`: it was, although that test implies it. `taken`: its
-    result was copied from another run. `engine` made it, from 1.
+    What an event says of it is as in `TestStarted` and `TestFinished`. `outcome` is "running" until
+    it ends; a baseline run that failed is "failed" until f is fixed. `node` was the current one;
+    for a fresh run it is the last one on the way there with its environment. In a round, a `run`
+    above 0 is a re-run (deflaking). `removal` is the number of the removal in whose world it ran.
+    `implied_by`: it was not simulated, since that test implies it; `audits`: it was, although that
+    test implies it. `taken`: its result was copied from another run. `engine` made it, from 1.
     """
 
     id: int

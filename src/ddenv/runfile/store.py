@@ -1,7 +1,8 @@
 """Reading and writing a run file (`NAME.ddenv`, SQLite in WAL mode).
 
-The engine is the only writer of events; viewers read, and append commands. Nothing in the file is ever executed: documents
-are text, event data is JSON, trajectories are rows of little-endian float64.
+The engine is the only writer of events; viewers read, and append commands. Nothing in the file is
+ever executed: documents are text, event data is JSON, trajectories are rows of little-endian
+float64.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ OLDEST_VERSION = 7
 # The maximum time, Unix time in s: the year 5138.
 LATEST = 1e11
 COLUMNS = 8  # time s, x, y, z m, quaternion w, x, y, z
-# Maximum wait for another process to finish writing, s: a screen must not freeze, an engine must not give up.
+# Maximum wait for another process to finish writing, s: a screen must not freeze, an engine must
+# not give up.
 VIEWER_WAIT = 1.0
 ENGINE_WAIT = 30.0
 
@@ -45,22 +47,26 @@ CREATE TABLE event (id INTEGER PRIMARY KEY AUTOINCREMENT, time REAL NOT NULL, ki
 CREATE TABLE command (id INTEGER PRIMARY KEY AUTOINCREMENT, time REAL NOT NULL, kind TEXT NOT NULL, data TEXT NOT NULL);
 CREATE TABLE motion (test INTEGER NOT NULL, model TEXT NOT NULL, samples BLOB NOT NULL, PRIMARY KEY (test, model)) WITHOUT ROWID;
 CREATE TABLE live (slot INTEGER PRIMARY KEY, test INTEGER NOT NULL, time REAL NOT NULL, pose TEXT NOT NULL);
-"""
+"""  # noqa: E501: a run file keeps this text, and is compared with it.
 _ROWS = "SELECT id, time, kind, data FROM {} WHERE id > ? ORDER BY id LIMIT ?"
 _TABLES = {statement.strip() for statement in _SCHEMA.split(";") if statement.strip()}
-# The endings of the files that SQLite keeps beside a run file while it is open. After a kill they stay.
+# The endings of the files that SQLite keeps beside a run file while it is open. After a kill they
+# stay.
 LOGS = ("-wal", "-shm", "-journal")
 # A quota, and a limit of a file's size, come as an error of writing.
 _FULL = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE)
 NOWHERE = (0, 0)
 ROBOT = ""  # the robot's own rows in `motion`; models cannot have an empty name
-# Samples by model. In place of the robot's, an implied test has the number of the test that it follows from, which has all of its.
+# Samples by model. In place of the robot's, an implied test has the number of the test that it
+# follows from, which has all of its.
 Motions = dict[str, bytes | int]
 
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """An event of a run file. `time` is Unix time, s; `command` is the number of the viewer's request that caused it."""
+    """An event of a run file. `time` is Unix time, s; `command` is the number of the viewer's
+    request that caused it.
+    """
 
     id: int
     time: float
@@ -93,7 +99,9 @@ class Request:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Live:
-    """A running test: simulated `time`, s, the pose (x, y, z m, qw, qx, qy, qz) of the robot, and those of models that moved."""
+    """A running test: simulated `time`, s, the pose (x, y, z m, qw, qx, qy, qz) of the robot, and
+    those of models that moved.
+    """
 
     slot: int
     test: int
@@ -103,7 +111,9 @@ class Live:
 
 
 def create(path: Path, documents: dict[str, bytes], created: Created) -> None:
-    """Creates a run file atomically, with `created` as its first event. Raises UserError if it exists or cannot be written."""
+    """Creates a run file atomically, with `created` as its first event. Raises UserError if it
+    exists or cannot be written.
+    """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
@@ -135,8 +145,8 @@ def create(path: Path, documents: dict[str, bytes], created: Created) -> None:
 
 
 def _forget(path: Path) -> None:
-    """Removes what a killed run of this name has left, if its file is gone: SQLite would add it to the new file. Raises UserError
-    while an engine still works on the deleted file.
+    """Removes what a killed run of this name has left, if its file is gone: SQLite would add it to
+    the new file. Raises UserError while an engine still works on the deleted file.
     """
     logs = [log for ending in LOGS if (log := path.with_name(f"{path.name}{ending}")).exists()]
     if not logs or path.exists():
@@ -154,9 +164,11 @@ class NoRoom(UserError):
 
 
 class RunFile:
-    """An open run file. Raises UserError for a file that is missing, not a run file, or of another format.
+    """An open run file. Raises UserError for a file that is missing, not a run file, or of another
+    format.
 
-    `untouched` reads the file alone: not its log, and nothing is made beside it. `wait` is how long another process may write, s.
+    `untouched` reads the file alone: not its log, and nothing is made beside it. `wait` is how long
+    another process may write, s.
     """
 
     def __init__(self, path: Path, untouched: bool = False, wait: float = VIEWER_WAIT) -> None:
@@ -237,7 +249,9 @@ class RunFile:
         }
 
     def events(self, after: int = 0, most: int = -1) -> list[Recorded]:
-        """All events with an id above `after`, in order; at most `most` unless that is negative. Raises UserError."""
+        """All events with an id above `after`, in order; at most `most` unless that is negative.
+        Raises UserError.
+        """
         return list(self.read(after, most))
 
     def read(self, after: int = 0, most: int = -1) -> Iterator[Recorded]:
@@ -273,7 +287,9 @@ class RunFile:
         return None if row is None else _floats(row[0], self.path)
 
     def trajectory(self, test: int) -> array[float]:
-        """Samples of the robot in a finished test, flat rows of `COLUMNS` floats. Raises UserError if there are none."""
+        """Samples of the robot in a finished test, flat rows of `COLUMNS` floats. Raises UserError
+        if there are none.
+        """
         samples = self.motion(test)
         if not samples or not all(map(math.isfinite, samples)):
             raise UserError(f"{self.path}: test {test} has no trajectory in this file")
@@ -317,8 +333,9 @@ class RunFile:
     # For the engine alone.
 
     def own(self, wait: Callable[[NoRoom], bool] | None = None) -> None:
-        """Prepares for writing: readers are never blocked, and a killed engine loses no committed event. Where the disk has no room
-        for an event, `wait` is called; it returns whether to try again.
+        """Prepares for writing: readers are never blocked, and a killed engine loses no committed
+        event. Where the disk has no room for an event, `wait` is called; it returns whether to try
+        again.
         """
         self._owned = _identity(self.path)
         self._wait = wait
@@ -337,9 +354,10 @@ class RunFile:
         command: int | None = None,
         number: int | None = None,
     ) -> Recorded:
-        """Records one event, with the trajectories of its test, in one transaction; `command` is the number of what caused it. The
-        trajectories of a run that is no test need a `number`, which is negative. Raises UserError if the run file was deleted or
-        replaced meanwhile: SQLite would go on to write what nobody can read.
+        """Records one event, with the trajectories of its test, in one transaction; `command` is
+        the number of what caused it. The trajectories of a run that is no test need a `number`,
+        which is negative. Raises UserError if the run file was deleted or replaced meanwhile:
+        SQLite would go on to write what nobody can read.
         """
         from ddenv.runfile.events import Implied, TestFinished
 
@@ -397,7 +415,8 @@ class RunFile:
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
         if self._owned is not None and (now := _identity(self.path)) != self._owned:
-            # The log goes into the file, wherever that is now, and away: SQLite would add it to another file of this name.
+            # The log goes into the file, wherever that is now, and away: SQLite would add it to
+            # another file of this name.
             with suppress(sqlite3.Error):
                 self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
             for log, identity in self._logs.items():

@@ -1,4 +1,6 @@
-"""What rests on what in a run's world: what falls when other models go, and which models form a stack."""
+"""What rests on what in a run's world: what falls when other models go, and which models form a
+stack.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ def drops_without(state: RunState, models: frozenset[str]) -> Names:
 
 
 def stacks_of(state: RunState, environment: Names) -> tuple[Names, ...]:
-    """The models of `environment` in groups that stay or go together: what is welded, and stacks if the run keeps them whole."""
+    """The models of `environment` in groups that stay or go together: what is welded, and stacks if
+    the run keeps them whole.
+    """
     whole = read(state.scenario, SETTINGS["keep_supports"])
     return stacks(environment, (*state.welds, *state.supports) if whole else state.welds)
 
@@ -41,7 +45,8 @@ def stack_with(state: RunState, environment: Names, name: str | None) -> Names:
 
 
 def dropped(supports: Pairs, keep: Iterable[str], environment: Iterable[str]) -> Names:
-    """The models of `keep` that lose something that they rest on, or rest on one that does, in the order of `keep`.
+    """The models of `keep` that lose something that they rest on, or rest on one that does, in the
+    order of `keep`.
 
     What is not in the `environment` was removed before: what rested on it has fallen already.
     """
@@ -58,10 +63,11 @@ def dropped(supports: Pairs, keep: Iterable[str], environment: Iterable[str]) ->
 
 @lru_cache(maxsize=16)
 def stacks(environment: Names, supports: Pairs) -> tuple[Names, ...]:
-    """The models of `environment` in groups that are connected by support; what is not there connects nothing.
+    """The models of `environment` in groups that are connected by support; what is not there
+    connects nothing.
 
-    A model that neither rests on another nor carries one is a stack of its own. Models, and stacks by their first models, are in
-    the environment's order.
+    A model that neither rests on another nor carries one is a stack of its own. Models, and stacks
+    by their first models, are in the environment's order.
     """
     group_of = {name: [name] for name in environment}
     for pair in supports:

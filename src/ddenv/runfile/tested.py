@@ -11,7 +11,9 @@ from ddenv.text import first_of
 
 
 def purpose(state: RunState, test: Test) -> str:
-    """What `test` was made for, in words, as far as `state` knows: all of it in the state in which the test started."""
+    """What `test` was made for, in words, as far as `state` knows: all of it in the state in which
+    the test started.
+    """
     if test.id < 0:
         return test.phase
     row = made_for(state, test)
@@ -38,8 +40,9 @@ def purpose(state: RunState, test: Test) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a viewer wants the scene to show: the moment of the event `at`, None for the present, and a row of the table then. A
-    candidate is one of round number `round`; without one, and without a try, the scene follows the run.
+    """What a viewer wants the scene to show: the moment of the event `at`, None for the present,
+    and a row of the table then. A candidate is one of round number `round`; without one, and
+    without a try, the scene follows the run.
     """
 
     at: int | None = None
@@ -49,7 +52,9 @@ class Wanted:
 
 
 def made_for(state: RunState, test: Test | Wanted) -> Candidate | Trial | None:
-    """The candidate of the current round, or the try, that a test was made for, or that is wanted."""
+    """The candidate of the current round, or the try, that a test was made for, or that is
+    wanted.
+    """
     if test.trial is not None:
         return state.trials[test.trial - 1] if 0 < test.trial <= len(state.trials) else None
     current = state.round
@@ -69,7 +74,9 @@ def adoptable(state: RunState) -> Trial | None:
 
 
 def told(moment: Moment) -> Test | None:
-    """The test whose end a moment tells: the one that ended in it, or the last one of a candidate that was judged."""
+    """The test whose end a moment tells: the one that ended in it, or the last one of a candidate
+    that was judged.
+    """
     from ddenv.runfile.events import CandidateJudged, Implied, TestFinished
 
     state = moment.after

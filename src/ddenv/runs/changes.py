@@ -1,4 +1,6 @@
-"""Runs with a changed number beside one of what is left with the same seed: as tests that can be played, compared and drawn."""
+"""Runs with a changed number beside one of what is left with the same seed: as tests that can be
+played, compared and drawn.
+"""
 
 from __future__ import annotations
 
@@ -15,15 +17,17 @@ from ddenv.world.model import Model, World
 from ddenv.world.pose import Pose
 from ddenv.world.sdf.numbers import move_of
 
-# A model that has moved to a limit: the verdict there, such as "f", the model, and how it has moved.
+# A model that has moved to a limit: the verdict there, such as "f", the model, and how it has
+# moved.
 Limit = tuple[str, Model, Pose]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """A number with another `value`, `share` of its scale away, at a limit of its margin, as `sentence` says; it means `changes` of
-    numbers to values. `parting` compares two runs with one seed, of what is left as it is and with that value; None where no such
-    pair is stored. `limits` are those up to which its model may move, if the number is a place.
+    """A number with another `value`, `share` of its scale away, at a limit of its margin, as
+    `sentence` says; it means `changes` of numbers to values. `parting` compares two runs with one
+    seed, of what is left as it is and with that value; None where no such pair is stored. `limits`
+    are those up to which its model may move, if the number is a place.
     """
 
     name: str
@@ -37,7 +41,9 @@ class Change:
 
 
 def changes(file: RunFile, state: RunState, world: World | None) -> tuple[Change, ...]:
-    """A change for each number with a limit: to the nearest value at which the robot reaches its goal, or else f is gone."""
+    """A change for each number with a limit: to the nearest value at which the robot reaches its
+    goal, or else f is gone.
+    """
     margins = state.margins
     if margins is None:
         return ()
@@ -82,7 +88,9 @@ def changes(file: RunFile, state: RunState, world: World | None) -> tuple[Change
 
 
 def beside(state: RunState) -> Test | None:
-    """The run of what is left that shows f and with which those with changed numbers are compared; None if there is none."""
+    """The run of what is left that shows f and with which those with changed numbers are compared;
+    None if there is none.
+    """
     margins = state.margins
     there = margins and margins.asked.environment
     tests = (
@@ -94,7 +102,9 @@ def beside(state: RunState) -> Test | None:
 
 
 def changed_run(state: RunState, number: int) -> tuple[MarginRan, Test]:
-    """The run with this negative `number`, also as a test, whose phase says what was changed. Raises UserError."""
+    """The run with this negative `number`, also as a test, whose phase says what was changed.
+    Raises UserError.
+    """
     margins = state.margins
     place = -1 if margins is None else -number - 1 - margins.earlier
     if margins is None or not 0 <= place < len(margins.runs):

@@ -21,7 +21,8 @@ LONGEST = 60
 NONE = "none"
 # What a screen shows elsewhere, or what every run has its own of.
 ASIDE = ("name", "description", "folder")
-# Files are the same if their names are: a run holds its own copy, and its machine has other folders.
+# Files are the same if their names are: a run holds its own copy, and its machine has other
+# folders.
 FILES = ("world", "model")
 # A difference: what differs, and how it is in the first and in the second.
 Difference = tuple[str, str, str]
@@ -77,7 +78,9 @@ def _value(value: Any) -> str:
 
 
 def _names(run: Recent, other: Recent, *, in_both: bool) -> str:
-    """The models that are left in `run`: those that are left in `other` too, or those that are not."""
+    """The models that are left in `run`: those that are left in `other` too, or those that are
+    not.
+    """
     names = [plain(name) for name in run.kept if (name in other.kept) == in_both]
     return f"{len(names)}: {first_of(names, MOST_COMPARED)}" if names else NONE
 

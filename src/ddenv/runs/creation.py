@@ -39,9 +39,11 @@ def create_named(
     output: Path | None,
     announce: Announce | None = None,
 ) -> tuple[Path, World]:
-    """Writes a new run of the scenario or the world `subject`, with the options `given`; returns its file and its world.
+    """Writes a new run of the scenario or the world `subject`, with the options `given`; returns
+    its file and its world.
 
-    `asks` whether what it starts is trusted. `name` and `output` as for `run_path`. Raises UserError, with nothing written.
+    `asks` whether what it starts is trusted. `name` and `output` as for `run_path`. Raises
+    UserError, with nothing written.
     """
     if output is not None and is_world(output) and output.exists():
         raise UserError(f"--output: {output} exists already; choose another name")
@@ -64,7 +66,9 @@ def create_named(
 
 
 def create_run(scenario: Scenario, path: Path) -> World:
-    """Writes a new run file with everything a reduction needs; returns its world. Raises UserError, with nothing written."""
+    """Writes a new run file with everything a reduction needs; returns its world. Raises UserError,
+    with nothing written.
+    """
     check_cluster(scenario.reduction.cluster)
     world, _ = load_parts(scenario)
     documents = {"world": world.text, "robot": read_bytes(scenario.robot.model)}
@@ -73,7 +77,8 @@ def create_run(scenario: Scenario, path: Path) -> World:
 
 
 def create_like(run: Path, scenario: Scenario, path: Path) -> None:
-    """Writes a new run file at `path` with the world and the robot of `run`, and another `scenario`.
+    """Writes a new run file at `path` with the world and the robot of `run`, and another
+    `scenario`.
 
     The original files of world and robot are not needed. Raises UserError, with nothing written.
     """
@@ -87,7 +92,8 @@ def create_like(run: Path, scenario: Scenario, path: Path) -> None:
 
 
 def create_inside(run: Path, path: Path) -> World:
-    """Writes a new run file at `path` with what is left of `run`, whose models are opened into their parts; returns its world.
+    """Writes a new run file at `path` with what is left of `run`, whose models are opened into
+    their parts; returns its world.
 
     Raises UserError, with nothing written.
     """

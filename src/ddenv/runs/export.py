@@ -1,4 +1,6 @@
-"""Exports the minimal environment of a run: as SDF, and with a scenario that runs the robot in it."""
+"""Exports the minimal environment of a run: as SDF, and with a scenario that runs the robot in
+it.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ from ddenv.world.write import without
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """The written files, and the URIs of other files that the written world needs. `whole`: f was not known yet."""
+    """The written files, and the URIs of other files that the written world needs. `whole`: f was
+    not known yet.
+    """
 
     files: list[Path]
     needs: list[str]
@@ -42,10 +46,11 @@ def export_world(
     passes: bool = False,
     margins: Sequence[str] = (),
 ) -> Exported:
-    """Writes the current environment of a run, or the nearest world that `passes`, to `sdf`, and a scenario for it if asked.
+    """Writes the current environment of a run, or the nearest world that `passes`, to `sdf`, and a
+    scenario for it if asked.
 
-    With `margins`, NAME or NAME=VALUE, these numbers are changed: to the value nearest to the present one at which the robot
-    reaches its goal if no other is given. Raises UserError.
+    With `margins`, NAME or NAME=VALUE, these numbers are changed: to the value nearest to the
+    present one at which the robot reaches its goal if no other is given. Raises UserError.
     """
     with RunFile(run) as file:
         subject = read_subject(file)
@@ -64,7 +69,8 @@ def export_world(
     there = with_margins(subject, margins)
     if scenario_file is None and there.scenario != scenario:
         raise UserError(
-            "--margin: this is a number of the scenario, not of the world: also give --scenario FILE"
+            "--margin: this is a number of the scenario, not of the world: also give --scenario "
+            "FILE"
         )
     scenario = there.scenario
     world = there.world
@@ -90,7 +96,8 @@ def export_world(
     data["robot"]["model"] = _name(model, folder)
     data["whole"] = whole_of(world, scenario).model_dump(mode="json")
     data["protected"] = renamed(scenario.protected, world, removed, minimal)
-    # Those folders of the original world and robot that the exported files still need, and the robot's packages.
+    # Those folders of the original world and robot that the exported files still need, and the
+    # robot's packages.
     own = scenario.robot.model
     asked_by_robot = Resources(documents)
     parse_model(robot, own, scenario.reading, asked_by_robot)
@@ -108,7 +115,9 @@ def export_world(
 
 
 def with_margins(subject: Subject, margins: Sequence[str]) -> Subject:
-    """A run's world and scenario with the changes that `margins`, each NAME or NAME=VALUE, mean. Raises UserError."""
+    """A run's world and scenario with the changes that `margins`, each NAME or NAME=VALUE, mean.
+    Raises UserError.
+    """
     scenario = subject.scenario
     world = subject.world
     state = subject.state
@@ -148,7 +157,10 @@ def _margin(
         (fix.value for fix in fixes if fix.name == name and fix.confirmed is not False), None
     )
     if found is None:
-        again = f"look for one with: ddenv margins {run} --number '{name}', or give a value: --margin {name}=VALUE"
+        again = (
+            f"look for one with: ddenv margins {run} --number '{name}', or give a value: "
+            f"--margin {name}=VALUE"
+        )
         raise UserError(
             f"--margin: no value of {name} is known at which the robot reaches its goal; {again}"
         )
@@ -156,7 +168,9 @@ def _margin(
 
 
 def keys_in(folder: Path, scenario: Scenario) -> Data:
-    """The keys of a file in `folder` with this scenario: what lies in there is named relative to it, so that it can be moved."""
+    """The keys of a file in `folder` with this scenario: what lies in there is named relative to
+    it, so that it can be moved.
+    """
     data = scenario.model_dump(mode="json")
     # The scenario's folder is only searched for the user's own programs.
     if scenario.oracle is None and ":" not in scenario.controller.use:
@@ -172,13 +186,17 @@ def keys_in(folder: Path, scenario: Scenario) -> Data:
 
 
 def _name(path: Path, folder: Path) -> str:
-    """`path` as written in a scenario in `folder`: relative if it lies in that folder, so that the folder can be moved."""
+    """`path` as written in a scenario in `folder`: relative if it lies in that folder, so that the
+    folder can be moved.
+    """
     path = path.resolve()
     return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
 
 
 def renamed(protected: Names, world: World, removed: frozenset[str], minimal: World) -> Names:
-    """The names of protected models in the minimal world, where copies of one name are numbered anew; a part's is its model's."""
+    """The names of protected models in the minimal world, where copies of one name are numbered
+    anew; a part's is its model's.
+    """
     wholes = {model.name: model.inside or model.name for model in world.models}
     kept = dict.fromkeys(whole for name, whole in wholes.items() if name not in removed)
     now = dict.fromkeys(model.inside or model.name for model in minimal.models)

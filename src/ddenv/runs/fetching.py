@@ -1,4 +1,6 @@
-"""Downloads the models in Gazebo Fuel that a world or a robot needs and that are not here, where the user asks for it."""
+"""Downloads the models in Gazebo Fuel that a world or a robot needs and that are not here, where
+the user asks for it.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +28,11 @@ def fetch_missing(
     tell: Callable[[str], None],
     advice: str,
 ) -> None:
-    """Downloads the missing models that a file names, then those that these name, and so on; `parse` reads the file.
+    """Downloads the missing models that a file names, then those that these name, and so on;
+    `parse` reads the file.
 
-    `show` gets each model before it comes, and `tell` a line on it when it is there. `advice` says how to leave one out, with `{}`
-    for a stand-in of none. Raises UserError.
+    `show` gets each model before it comes, and `tell` a line on it when it is there. `advice` says
+    how to leave one out, with `{}` for a stand-in of none. Raises UserError.
     """
     whole = reading.model_copy(update={"inside": False})
     tried: set[FuelModel] = set()
@@ -49,7 +52,8 @@ def fetch_missing(
 
 
 def missing_models(file: Path, reading: Reading, parse: Parse) -> dict[FuelModel, str]:
-    """The models in Fuel that a file names and that are not on this machine, each with a URI that names it.
+    """The models in Fuel that a file names and that are not on this machine, each with a URI that
+    names it.
 
     Raises UserError for other faults.
     """

@@ -20,7 +20,8 @@ SUFFIX = ".ddenv"
 SCENARIO_FILES = (".yaml", ".yml")
 # The run in the folder of a bundle.
 BUNDLED_RUN = f"run{SUFFIX}"
-# Maximum length of a run's name, bytes: leaves room for a number and for the suffixes of the files beside it.
+# Maximum length of a run's name, bytes: leaves room for a number and for the suffixes of the files
+# beside it.
 LONGEST_STEM = 180
 
 
@@ -43,7 +44,8 @@ def find_run(name: str) -> Path:
 
 
 def named(name: str) -> tuple[Literal["run", "scenario", "world"], Path] | None:
-    """What `name` stands for, with its file, which need not exist if its suffix says what it is; None for any other name.
+    """What `name` stands for, with its file, which need not exist if its suffix says what it is;
+    None for any other name.
 
     A run comes before a bundled scenario, and every file before both.
     """
@@ -75,7 +77,9 @@ def attach_name(run: Path) -> str:
 
 
 def dropped_run(text: str) -> Path | None:
-    """The run file whose name a terminal pastes when the file is dropped on it: plain, quoted, escaped, or as a file:// URL."""
+    """The run file whose name a terminal pastes when the file is dropped on it: plain, quoted,
+    escaped, or as a file:// URL.
+    """
     try:
         words = shlex.split(text.strip())
     except ValueError:
@@ -100,7 +104,9 @@ def free_run_path(scenario_name: str, folder: Path | None = None) -> Path:
 
 
 def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
-    """Where a new run is written: `output` (a .ddenv file or a folder), or in the runs folder. Raises UserError."""
+    """Where a new run is written: `output` (a .ddenv file or a folder), or in the runs folder.
+    Raises UserError.
+    """
     if name is not None and (
         not name.strip() or any(char in name for char in "/\\\0") or name.startswith(".")
     ):
@@ -112,7 +118,8 @@ def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
     if output is not None and not output.is_dir():
         if output.suffix != SUFFIX:
             raise UserError(
-                f"--output: '{output}' is neither a folder nor a {', '.join((SUFFIX, *WORLD_ENDINGS))} file"
+                f"--output: '{output}' is neither a folder nor a "
+                f"{', '.join((SUFFIX, *WORLD_ENDINGS))} file"
             )
         return output
     folder = output or runs_folder()

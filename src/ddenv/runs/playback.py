@@ -1,4 +1,6 @@
-"""A finished test as it is played back: where the robot and the models that moved were at any instant, from the run file alone."""
+"""A finished test as it is played back: where the robot and the models that moved were at any
+instant, from the run file alone.
+"""
 
 from __future__ import annotations
 
@@ -23,15 +25,18 @@ FRAME = 0.1
 LONGEST = 1e6
 FARTHEST = 1e6
 
-ANOTHER_SIMULATOR = "Another simulator made this run: only the robot's path is stored; models stay where they start."
+ANOTHER_SIMULATOR = (
+    "Another simulator made this run: only the robot's path is stored; models stay where they "
+    "start."
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Played:
     """A finished test. `words` say what it was made for; `models` were in it.
 
-    `rows` are the robot's, flat rows of `COLUMNS` floats, empty if the run file lacks them; `moving` has those of each model that
-    moved. `lacks` says in sentences what is missing.
+    `rows` are the robot's, flat rows of `COLUMNS` floats, empty if the run file lacks them;
+    `moving` has those of each model that moved. `lacks` says in sentences what is missing.
     """
 
     test: Test
@@ -57,7 +62,9 @@ class Played:
 
 
 def played(file: RunFile, position: Position, number: int) -> Played:
-    """The finished test with this number. Raises UserError if there is none; what the file lacks of it is said in `lacks`."""
+    """The finished test with this number. Raises UserError if there is none; what the file lacks of
+    it is said in `lacks`.
+    """
     tests = position.end.tests
     if number < 0:
         _, test = changed_run(position.end, number)
@@ -90,7 +97,8 @@ def played(file: RunFile, position: Position, number: int) -> Played:
         # No number compares with NaN.
         if not (in_time and (np.abs(stored) <= FARTHEST).all()):
             lacks.append(
-                f"The motion of {name or 'the robot'} in test {number} is damaged: it stays where it starts."
+                f"The motion of {name or 'the robot'} in test {number} is damaged: it stays "
+                "where it starts."
             )
         elif name == ROBOT:
             rows = samples
@@ -100,7 +108,8 @@ def played(file: RunFile, position: Position, number: int) -> Played:
         test = replace(test, simulated_seconds=test.simulated_seconds or rows[-COLUMNS])
     else:
         lacks.append(
-            f"The run file has no path of the robot in test {number} (bundles leave paths out): nothing moves here."
+            f"The run file has no path of the robot in test {number} (bundles leave paths out): "
+            "nothing moves here."
         )
     return Played(
         test=test,

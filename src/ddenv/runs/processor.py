@@ -1,4 +1,6 @@
-"""The machine: its processor's name, how many cores and how much memory this process may use, and which packages it has."""
+"""The machine: its processor's name, how many cores and how much memory this process may use, and
+which packages it has.
+"""
 
 from __future__ import annotations
 
@@ -37,8 +39,8 @@ def versions(*packages: str) -> str:
 def usable_cores() -> int:
     """How many cores this process may use at the same time, at least 1.
 
-    The minimum of its CPU affinity and the limits of its control groups (version 1 and 2) and all groups around them, as in a
-    container; a part of a core counts as one.
+    The minimum of its CPU affinity and the limits of its control groups (version 1 and 2) and all
+    groups around them, as in a container; a part of a core counts as one.
     """
     cores: float = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -51,8 +53,8 @@ def usable_cores() -> int:
 
 
 def usable_memory() -> float:
-    """How much memory all that runs here may use, bytes: the machine's, or less where a control group allows less. Infinite where
-    that is not known.
+    """How much memory all that runs here may use, bytes: the machine's, or less where a control
+    group allows less. Infinite where that is not known.
     """
     return min([_meminfo("MemTotal"), *(limit for limit, _ in _memory_groups())])
 
@@ -78,8 +80,9 @@ def _memory_groups() -> Iterator[tuple[float, float]]:
 
 
 def _groups(controller: str, new: tuple[str, ...], old: tuple[str, ...]) -> Iterator[list[str]]:
-    """What the files `new`, or in version 1 `old`, say of each control group that may limit this process: its own and those
-    around it. In a container their paths may be those of the host: then the limits are at the top.
+    """What the files `new`, or in version 1 `old`, say of each control group that may limit this
+    process: its own and those around it. In a container their paths may be those of the host: then
+    the limits are at the top.
     """
     for line in _text("proc/self/cgroup").splitlines():
         _, _, rest = line.partition(":")

@@ -1,4 +1,6 @@
-"""Starts and stops the programs beside a view, the engine and the 3-D scene, and says how to install what is missing."""
+"""Starts and stops the programs beside a view, the engine and the 3-D scene, and says how to
+install what is missing.
+"""
 
 from __future__ import annotations
 
@@ -37,8 +39,8 @@ def log_of(run: Path) -> Path:
 def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen[bytes]:
     """Starts the engine on a run in its own session, so that it outlives this terminal.
 
-    Its output goes to a log beside the run file. `options` that are not None become `--name=value` on its command line.
-    Raises UserError.
+    Its output goes to a log beside the run file. `options` that are not None become `--name=value`
+    on its command line. Raises UserError.
     """
     with RunFile(run) as file:
         words = [
@@ -74,7 +76,8 @@ def _log(place: Path, run: Path) -> BinaryIO:
 
 
 def export_mcap(run: Path, file: Path, stopped: Callable[[], bool]) -> None:
-    """Writes what the robot sensed and did; the runs are made again by Drake in a process of their own.
+    """Writes what the robot sensed and did; the runs are made again by Drake in a process of their
+    own.
 
     Raises UserError, also once it is `stopped`; then nothing is written.
     """
@@ -126,14 +129,18 @@ def last_words(run: Path) -> str:
             crashed = f": {line.strip()}"
     if said and said != ENGINE_STARTED:
         return said
-    return f"{run}: the engine was killed or crashed{crashed} (see {log}); go on with 'ddenv resume {run}'"
+    return (
+        f"{run}: the engine was killed or crashed{crashed} (see {log}); go on with 'ddenv resume "
+        f"{run}'"
+    )
 
 
 def start_scene(run: Path) -> subprocess.Popen[str]:
-    """Starts the scene program on a run; its first line of output is the URL it serves on 127.0.0.1.
+    """Starts the scene program on a run; its first line of output is the URL it serves on
+    127.0.0.1.
 
-    It shows what its standard input asks for (`Wanted`), and ends with its parent. An empty first line means that it could not
-    start; its log says why.
+    It shows what its standard input asks for (`Wanted`), and ends with its parent. An empty first
+    line means that it could not start; its log says why.
     """
     try:
         log = _log(run.with_name(f"{run.name}.scene.log"), run)

@@ -1,5 +1,5 @@
-"""Why what is left makes the robot fail: what happens without each of its models, from the certificate's fresh runs alone; and the
-nearest world that passes.
+"""Why what is left makes the robot fail: what happens without each of its models, from the
+certificate's fresh runs alone; and the nearest world that passes.
 """
 
 from __future__ import annotations
@@ -40,10 +40,11 @@ APART = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class End:
-    """A way in which `number` runs ended, after `seconds` of simulated time (their median) at `place`, x and y, m (medians).
+    """A way in which `number` runs ended, after `seconds` of simulated time (their median) at
+    `place`, x and y, m (medians).
 
-    None of them ended farther than `reach`, m, from there. They ended so far `away` from f's end, m (median).
-    `kind` is `F`, `GOAL`, or the `failure` of a run that ended otherwise.
+    None of them ended farther than `reach`, m, from there. They ended so far `away` from f's end, m
+    (median). `kind` is `F`, `GOAL`, or the `failure` of a run that ended otherwise.
     """
 
     kind: str
@@ -56,10 +57,12 @@ class End:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parting:
-    """Where two runs with the same seed part: one of what is left, which shows f, and one without a model.
+    """Where two runs with the same seed part: one of what is left, which shows f, and one without a
+    model.
 
-    The robot moves alike to the last bit until `equal`, s, and is `APART` at `apart`, s, at `place`, x and y, m; None if it never
-    is. It touched the model, or else sensed it, for the first time at `met`, s; None if it did not.
+    The robot moves alike to the last bit until `equal`, s, and is `APART` at `apart`, s, at
+    `place`, x and y, m; None if it never is. It touched the model, or else sensed it, for the first
+    time at `met`, s; None if it did not.
     """
 
     with_test: int
@@ -76,8 +79,9 @@ class Parting:
 class Reason:
     """What happens without the model `without` and what rests on it, all of `gone`.
 
-    `ends` are those of the `runs` fresh runs (`exact`: of the chosen runs), the most frequent one first. `parting` is None where no
-    pair of runs shows it; `lacks` says why, if the run file does not have what it takes.
+    `ends` are those of the `runs` fresh runs (`exact`: of the chosen runs), the most frequent one
+    first. `parting` is None where no pair of runs shows it; `lacks` says why, if the run file does
+    not have what it takes.
     """
 
     without: str
@@ -90,7 +94,9 @@ class Reason:
 
 
 def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
-    """A reason for each model that the current certificate left out. Raises UserError where there is none."""
+    """A reason for each model that the current certificate left out. Raises UserError where there
+    is none.
+    """
     certificate = current(state)
     if certificate is None:
         raise UserError(uncertified(state, file.path))
@@ -108,7 +114,8 @@ def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
         gone = tuple(
             stack_with(state, state.nodes[certificate.node].environment, str(claim.without))
         )
-        # Also where it mostly still fails as in f: what it does else shows what the model is needed for.
+        # Also where it mostly still fails as in f: what it does else shows what the model is needed
+        # for.
         shown = next((end.kind for end in ends if end.kind != F), None)
         pairs = (
             (left[test.run], test) for test in mine if test.run in left and _kind(test) == shown
@@ -133,7 +140,10 @@ def no_reasons(certificate: Certificate) -> str:
     """Why a finished certificate left out no model, in a sentence."""
     if certificate.claims[0].verdict == "kept":
         return "No model is left to leave out, so there is nothing to compare."
-    return f"What the robot does without each model is not known, because none was left out: {verdict_on(certificate)}."
+    return (
+        "What the robot does without each model is not known, because none was left out: "
+        f"{verdict_on(certificate)}."
+    )
 
 
 def _kind(test: Test) -> str:
@@ -160,8 +170,9 @@ def _end(kind: str, tests: Sequence[Test]) -> End:
 def parting_of(
     file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str]
 ) -> tuple[Parting | None, str, str]:
-    """Where two tests part, one with the models `gone` and one without them; which of these took part first, "" if none did; and
-    what the run file lacks to say so. None where there is no such `pair`.
+    """Where two tests part, one with the models `gone` and one without them; which of these took
+    part first, "" if none did; and what the run file lacks to say so. None where there is no such
+    `pair`.
     """
     if pair is None:
         return None, "", ""
@@ -187,7 +198,9 @@ def parting_of(
 
 
 def parted(first: array[float], second: array[float]) -> tuple[float, float | None, Point | None]:
-    """Until when two trajectories (flat rows of `COLUMNS`) are equal, s; when and where the second is `APART` from the first."""
+    """Until when two trajectories (flat rows of `COLUMNS`) are equal, s; when and where the second
+    is `APART` from the first.
+    """
     equal = 0.0
     same = True
     for row in range(0, min(len(first), len(second)), COLUMNS):
@@ -232,14 +245,16 @@ def _does(end: End) -> str:
 
 
 def parting_sentence(reason: Reason) -> str:
-    """Where the paths with and without the models diverge, in one or two sentences; "" if no pair of runs shows it."""
+    """Where the paths with and without the models diverge, in one or two sentences; "" if no pair
+    of runs shows it.
+    """
     it = "it" if len(reason.gone) == 1 else "one of them"
     return parting_words(reason.parting, reason.lacks, f"With {it} there,", it)
 
 
 def parting_words(one: Parting | None, lacks: str, met: str, it: str = "it") -> str:
-    """When two runs begin to differ, and when and where they are visibly apart, or why that is not known; then a sentence that
-    begins with `met`, if the robot met `it`.
+    """When two runs begin to differ, and when and where they are visibly apart, or why that is not
+    known; then a sentence that begins with `met`, if the robot met `it`.
     """
     if one is None:
         return f"Where the paths diverge is not known: {lacks}." if lacks else ""
@@ -265,9 +280,10 @@ def parting_words(one: Parting | None, lacks: str, met: str, it: str = "it") -> 
 class Nearest:
     """The nearest world that passes: the whole world without the models `gone`.
 
-    `words` say what fresh runs show of it, in one sentence. `shown`: they show that it passes, and that it does not with any one of
-    `gone` put back. `parting` compares a run of the whole world, `with_test`, with one without `gone`; None where no pair of runs
-    with one seed shows it; `lacks` says why, if the run file does not have what it takes. `first` of `gone` took part first there.
+    `words` say what fresh runs show of it, in one sentence. `shown`: they show that it passes, and
+    that it does not with any one of `gone` put back. `parting` compares a run of the whole world,
+    `with_test`, with one without `gone`; None where no pair of runs with one seed shows it; `lacks`
+    says why, if the run file does not have what it takes. `first` of `gone` took part first there.
     """
 
     gone: Names
@@ -281,7 +297,10 @@ class Nearest:
     def sentences(self) -> str:
         """All of it in a few sentences."""
         said = f"{self.words[:1].upper()}{self.words[1:]}."
-        met = f"Of the removed models, {first_of((self.first,), 1)} is the first that can affect the run:"
+        met = (
+            f"Of the removed models, {first_of((self.first,), 1)} is the first that can affect "
+            "the run:"
+        )
         return f"{said} {parting_words(self.parting, self.lacks, met)}".rstrip()
 
 
@@ -295,7 +314,8 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
     if one.found is None:
         return Nearest(gone=(), words=words, shown=shown)
     gone = state.removals[one.found - 1].models
-    # A run of the whole world that fails, if possible as in f, and one of its seed, in the passing world, that does not.
+    # A run of the whole world that fails, if possible as in f, and one of its seed, in the passing
+    # world, that does not.
     passing = {
         test.run: test for test in state.tests if test.removal == one.found and test.outcome == GOAL
     }
@@ -309,11 +329,14 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
 
 
 def removed_in_passing(state: RunState, where: object) -> Names:
-    """The models that the nearest world that passes lacks. Raises UserError where there is no such world yet."""
+    """The models that the nearest world that passes lacks. Raises UserError where there is no such
+    world yet.
+    """
     one = state.isolated
     if one is None:
         raise UserError(
-            f"{where}: no world that passes is known yet; find the nearest one first: ddenv isolate {where}"
+            f"{where}: no world that passes is known yet; find the nearest one first: ddenv "
+            f"isolate {where}"
         )
     if one.found is None:
         raise UserError(f"{where}: {of_passing(state, one)}")

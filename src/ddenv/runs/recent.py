@@ -84,7 +84,9 @@ def recent_of(path: Path, state: RunState, changed: float) -> Recent:
 
 
 def computed(state: RunState) -> float:
-    """How long the simulations of a run took, s; results that were copied or implied cost nothing."""
+    """How long the simulations of a run took, s; results that were copied or implied cost
+    nothing.
+    """
     return sum(
         test.wall_seconds for test in state.tests if not test.taken and test.implied_by is None
     )

@@ -1,4 +1,5 @@
-"""What the user chose for files that worlds name but that cannot be found: by URI, a stand-in, `none`, or a folder.
+"""What the user chose for files that worlds name but that cannot be found: by URI, a stand-in,
+`none`, or a folder.
 
 The workbench asks for it; every command that reads a world uses it.
 """
@@ -35,7 +36,9 @@ def remember_remedies(chosen: Mapping[str, str]) -> None:
 
 
 def remedy(text: str) -> str:
-    """What the user typed, as a remedy: a stand-in, or else the path of a folder. Raises UserError."""
+    """What the user typed, as a remedy: a stand-in, or else the path of a folder. Raises
+    UserError.
+    """
     from ddenv.world.sdf.standin import AUTO, NONE, parse_stand_in
 
     text = text.strip()
@@ -52,7 +55,8 @@ def remedy(text: str) -> str:
     stand_in = parse_stand_in(text, "remedy") if text else AUTO
     if isinstance(stand_in, str) and stand_in not in (AUTO, NONE):
         raise UserError(
-            f"{text} is for single meshes, with --stand-in; auto takes the box around the visuals, too"
+            f"{text} is for single meshes, with --stand-in; auto takes the box around the "
+            "visuals, too"
         )
     return text
 

@@ -1,4 +1,6 @@
-"""What a user names, and what stands behind it: scenario, world and robot of a run, of a scenario file or of an SDF world."""
+"""What a user names, and what stands behind it: scenario, world and robot of a run, of a scenario
+file or of an SDF world.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +63,8 @@ class Subject:
 
 
 def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None = None) -> Subject:
-    """What `name` stands for: a run if there is one of that name, else a scenario or a world with the options `given`.
+    """What `name` stands for: a run if there is one of that name, else a scenario or a world with
+    the options `given`.
 
     `announce` gets a line on what is remembered. Raises UserError.
     """
@@ -72,7 +75,8 @@ def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None 
         return Subject(scenario=scenario, world=world, robot=robot)
     if has_options(given):
         raise UserError(
-            "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore, --inside and --fetch are only for scenarios; "
+            "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore, --inside "
+            "and --fetch are only for scenarios; "
             "a run keeps its own"
         )
     with RunFile(path) as file:
@@ -94,7 +98,8 @@ def has_options(given: Mapping[str, Any], *but: str) -> bool:
 def scenario_named(
     name: str, given: Mapping[str, Any], announce: Announce | None = None
 ) -> Scenario:
-    """The scenario of a name or a file, with the options `given`: places, those on how its world is read, and settings.
+    """The scenario of a name or a file, with the options `given`: places, those on how its world is
+    read, and settings.
 
     Raises UserError.
     """
@@ -127,7 +132,9 @@ def scenario_named(
 
 
 def world_of(path: Path) -> tuple[Path, Reading]:
-    """The world that a file is, or that a scenario's file or name stands for; and how the scenario reads it. Raises UserError."""
+    """The world that a file is, or that a scenario's file or name stands for; and how the scenario
+    reads it. Raises UserError.
+    """
     kind, path = named_file(str(path)) or ("world", path)
     if kind == "world":
         return path, PLAIN
@@ -144,7 +151,8 @@ def reading_of(
     inside: bool | None = None,
     mesh: MeshReading | None = None,
 ) -> Reading:
-    """`reading` with more folders (searched first), stand-ins (`URI=SHAPE`), ignored elements, `inside` and `mesh`.
+    """`reading` with more folders (searched first), stand-ins (`URI=SHAPE`), ignored elements,
+    `inside` and `mesh`.
 
     Raises UserError.
     """
@@ -165,7 +173,8 @@ def reading_of(
 
 
 def with_remembered(world: Path, reading: Reading, announce: Announce | None = None) -> Reading:
-    """How to read a world, with the remedies that the user chose for files which it lacks; it says which these are.
+    """How to read a world, with the remedies that the user chose for files which it lacks; it says
+    which these are.
 
     Whatever else is wrong with the world shows when it is read.
     """
@@ -189,13 +198,15 @@ def with_remembered(world: Path, reading: Reading, announce: Announce | None = N
             [f"{shortened(uri, LONGEST)} ({text})" for uri, text in found.items()], NAMED
         )
         announce(
-            f"uses what you chose for {names}; {state_file(REMEDIES)} keeps that, --no-remembered leaves it out"
+            f"uses what you chose for {names}; {state_file(REMEDIES)} keeps that, "
+            "--no-remembered leaves it out"
         )
     return read_as if found else reading
 
 
 def without_guesses_at_start(scenario: Scenario, announce: Announce | None = None) -> Scenario:
-    """`scenario`, in which what is missing is left out where a guess of its shape would be around the robot; it says what that is.
+    """`scenario`, in which what is missing is left out where a guess of its shape would be around
+    the robot; it says what that is.
 
     Raises UserError.
     """
@@ -226,7 +237,9 @@ def without_guesses_at_start(scenario: Scenario, announce: Announce | None = Non
 def scenario_for_world(
     world: Path, spawn: tuple[float, float, float, float], goal: Point
 ) -> Scenario:
-    """A scenario for the bundled robot in any SDF world: `spawn` x, y, z m and yaw rad, `goal` x, y m. Raises UserError."""
+    """A scenario for the bundled robot in any SDF world: `spawn` x, y, z m and yaw rad, `goal` x, y
+    m. Raises UserError.
+    """
     data = {
         "name": world.stem.removesuffix(".dmd")[:80] or "world",
         "world": str(resolved(world)),
@@ -251,8 +264,8 @@ def with_options(
 ) -> Scenario:
     """`scenario` with some of its settings replaced; those that are None stay. Raises UserError.
 
-    `protect` are more models that always stay.
-    `spawn` is x, y, z m and yaw rad (0 if left out), `goal` x, y m. `values` are settings by name; 0 takes back a limit.
+    `protect` are more models that always stay. `spawn` is x, y, z m and yaw rad (0 if left out),
+    `goal` x, y m. `values` are settings by name; 0 takes back a limit.
     """
     given = {name: value for name, value in values.items() if value is not None}
     for name, value in given.items():
@@ -289,7 +302,9 @@ def with_options(
 
 
 def with_values(data: Data, values: Mapping[str, Value]) -> Data:
-    """A scenario as plain data, with settings replaced by name; None or 0 takes back a limit. Raises UserError."""
+    """A scenario as plain data, with settings replaced by name; None or 0 takes back a limit.
+    Raises UserError.
+    """
     for name in values:
         if name not in SETTINGS:
             raise UserError(f"options: no setting '{name}'{nearest(name, SETTINGS)}")
@@ -300,7 +315,8 @@ def with_values(data: Data, values: Mapping[str, Value]) -> Data:
 
 
 def load_parts(scenario: Scenario) -> tuple[World, Model]:
-    """The world and the robot of a scenario, checked against each other; the world's `resources` are those of both.
+    """The world and the robot of a scenario, checked against each other; the world's `resources`
+    are those of both.
 
     Raises UserError.
     """
@@ -376,7 +392,9 @@ def read_scenario(run: RunFile) -> Scenario:
 
 @contextmanager
 def robot_file(subject: Subject) -> Iterator[Path]:
-    """The robot's file; one with the run's own text, as long as this lasts, where the original is not on this machine."""
+    """The robot's file; one with the run's own text, as long as this lasts, where the original is
+    not on this machine.
+    """
     original = subject.scenario.robot.model
     if subject.run is None or original.is_file():
         yield original

@@ -1,4 +1,5 @@
-"""How many tests a run takes: those still left by the engine's forecast, and a rough number before there is a run.
+"""How many tests a run takes: those still left by the engine's forecast, and a rough number before
+there is a run.
 
 Both count the certificate, which ends every run.
 """
@@ -20,7 +21,8 @@ from ddenv.text import Sentences, about, count, rounded
 # The latest tests show how long one takes. Workers wait for each other for some of the time.
 LATEST = 50
 BUSY = 0.9
-# Tests of n models without re-runs are about factor * n ** power: fitted to random worlds of 5 to 5000 models.
+# Tests of n models without re-runs are about factor * n ** power: fitted to random worlds of 5 to
+# 5000 models.
 SCALE = {
     "ddenv": (6.5, 0.32),
     "ddenv as printed": (5.6, 0.62),
@@ -28,22 +30,25 @@ SCALE = {
     "probdd": (8.0, 0.25),
     "splitting": (6.2, 0.25),
 }
-# Where the likely number of tests is nearly made or exceeded, one part in so many of it is still expected.
+# Where the likely number of tests is nearly made or exceeded, one part in so many of it is still
+# expected.
 LATE = 3
 # Most candidates do not show f, and get all their re-runs.
 # Eight of ten random worlds took between `FEWER` and `MORE` times as many tests.
 RERUN = 0.75
 FEWER = 0.35
 MORE = 2.3
-# Where f nearly always shows, so many runs without it make a candidate dissimilar, if the rate is to be kept.
+# Where f nearly always shows, so many runs without it make a candidate dissimilar, if the rate is
+# to be kept.
 FEWEST_MISSES = 2
-# Tests of a search that keeps the rate grow with this power of 1 / rate: 70, 117, 237 and 342 for rates of 1, .8, .5 and .32.
+# Tests of a search that keeps the rate grow with this power of 1 / rate: 70, 117, 237 and 342 for
+# rates of 1, .8, .5 and .32.
 RARER = 1.5
 LEAST_RATE = 0.02
 # How many models are left, if nothing is known.
 SURVIVORS = 3
-# How many models took part in the baseline: in the ditch 5 of 43, in friction 20 of 25, in the rubble 27 to 34 of 36, among 5,000
-# models 31.
+# How many models took part in the baseline: in the ditch 5 of 43, in friction 20 of 25, in the
+# rubble 27 to 34 of 36, among 5,000 models 31.
 TOOK_PART = (5, 20, 35)
 
 
@@ -56,8 +61,8 @@ class Remaining:
 
 
 def remaining(state: RunState, at_work: bool) -> Remaining | None:
-    """What is left of a run: of its search, and its certificate. None if unknown: before the first round, after more tests than
-    were expected, and at the end.
+    """What is left of a run: of its search, and its certificate. None if unknown: before the first
+    round, after more tests than were expected, and at the end.
 
     Without an engine `at_work` nothing runs, and the time is not known.
     """
@@ -81,7 +86,9 @@ def remaining(state: RunState, at_work: bool) -> Remaining | None:
 
 
 def left_said(state: RunState, at_work: bool) -> Sentences:
-    """What is left, in tests and with the time in brackets, from the longest form to none; nothing if it is unknown."""
+    """What is left, in tests and with the time in brackets, from the longest form to none; nothing
+    if it is unknown.
+    """
     left = remaining(state, at_work)
     if left is None:
         return ("more tests than forecast", "") if _is_overdue(state) else ()
@@ -136,14 +143,17 @@ def _expected(state: RunState) -> Expected | None:
 
 
 def _after(expected: Expected, done: int) -> Expected:
-    """What is left of `expected`, as (low, likely, high), once `done` are made. What is late is not about to end."""
+    """What is left of `expected`, as (low, likely, high), once `done` are made. What is late is not
+    about to end.
+    """
     low, likely, high = (max(0, each - done) for each in expected)
     return low, max(likely, min(expected[1], high) // LATE), high
 
 
 def search_tests(models: int, asked: Reduction, rate: float | None = None) -> Expected:
-    """Tests of a search in this number of `models`, as (low, likely, high), for an unknown world in which f shows at `rate`, by
-    default always. For every round the engine writes them as its forecast.
+    """Tests of a search in this number of `models`, as (low, likely, high), for an unknown world in
+    which f shows at `rate`, by default always. For every round the engine writes them as its
+    forecast.
     """
     runs = {"first": 1 + asked.iterations, "exact": asked.exact_seeds}.get(
         asked.accept_rate, min(1 + asked.iterations, FEWEST_MISSES)
@@ -164,7 +174,9 @@ def search_tests(models: int, asked: Reduction, rate: float | None = None) -> Ex
 
 @dataclass(frozen=True, slots=True)
 class Rough:
-    """A whole run, as (low, likely, high): tests of the `baseline`, of the `search` and of the `certificate`."""
+    """A whole run, as (low, likely, high): tests of the `baseline`, of the `search` and of the
+    `certificate`.
+    """
 
     baseline: int
     search: Expected
@@ -181,11 +193,13 @@ class Rough:
 def rough_run(
     models: int, asked: Reduction, rate: float | None = None, slices: bool = True
 ) -> Rough:
-    """Before there is a run: of `models` that can be removed, where f shows at `rate`, or if all runs of the baseline show it.
+    """Before there is a run: of `models` that can be removed, where f shows at `rate`, or if all
+    runs of the baseline show it.
 
-    With `slices`, and if they are asked for, only what took part in the baseline is searched. That has little to do with the size
-    of the world: `TOOK_PART` is how many models these were in the bundled worlds of 25 to 43 models and in one of 5,000: few,
-    usual, many. Without slices every model is searched.
+    With `slices`, and if they are asked for, only what took part in the baseline is searched. That
+    has little to do with the size of the world: `TOOK_PART` is how many models these were in the
+    bundled worlds of 25 to 43 models and in one of 5,000: few, usual, many. Without slices every
+    model is searched.
     """
     slices = slices and asked.slice
     searched = [min(models, most) if slices else models for most in TOOK_PART]

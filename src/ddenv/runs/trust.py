@@ -1,8 +1,10 @@
-"""Programs that a scenario brings along: its own controller, another simulator, or a cluster for its tests.
+"""Programs that a scenario brings along: its own controller, another simulator, or a cluster for
+its tests.
 
-They start only if the user trusts them: a run file holds its scenario, so one that came by mail can name any program of this
-machine. What is trusted is remembered with the contents of the files that the command names, or of the class's own module.
-Where one of these changes, the user is asked again.
+They start only if the user trusts them: a run file holds its scenario, so one that came by mail can
+name any program of this machine. What is trusted is remembered with the contents of the files that
+the command names, or of the class's own module. Where one of these changes, the user is asked
+again.
 """
 
 from __future__ import annotations
@@ -40,7 +42,8 @@ SCHEDULER = re.compile(r"(tcp|tls)://(\[[\w:.%]+\]|[\w.-]+):\d{1,5}")
 FILE = "trusted.json"
 # The environment variable with what is trusted without being remembered.
 UNREMEMBERED = "DDENV_TRUSTED"
-# Begins a scenario's file that ddenv wrote: it may be of a run that somebody sent, whose program nobody here has chosen.
+# Begins a scenario's file that ddenv wrote: it may be of a run that somebody sent, whose program
+# nobody here has chosen.
 WRITTEN = "# Written by ddenv; a program that it starts is asked about.\n"
 # Maximum number of files of one program that are looked at.
 MOST_FILES = 1000
@@ -48,7 +51,9 @@ MOST_FILES = 1000
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """What a scenario starts, in words for the user, and digests of it with its files: of a program, of a cluster, or of both."""
+    """What a scenario starts, in words for the user, and digests of it with its files: of a
+    program, of a cluster, or of both.
+    """
 
     words: str
     digests: tuple[str, ...]
@@ -78,7 +83,9 @@ def _cluster_of(scenario: Scenario) -> list[Program]:
 
 
 def _own_program(scenario: Scenario) -> list[Program]:
-    """Its simulator or its controller, if it brings one, with the files that its command names, or its class's module."""
+    """Its simulator or its controller, if it brings one, with the files that its command names, or
+    its class's module.
+    """
     oracle = scenario.oracle
     what = "controller"
     use = scenario.controller.use
@@ -124,7 +131,9 @@ def untrusted(scenario: Scenario) -> Program | None:
 
 
 def trust(program: Program) -> None:
-    """Remembers that the user trusts it; where nothing can be remembered, for this process and the engines it starts."""
+    """Remembers that the user trusts it; where nothing can be remembered, for this process and the
+    engines it starts.
+    """
     trusted = sorted({*_trusted(), *program.digests})
     write_state(FILE, trusted)
     if not _trusted().issuperset(program.digests):
@@ -173,7 +182,8 @@ def trust_cluster(scenario: Scenario) -> None:
 def check_trusted(
     scenario: Scenario, where: Path | str, asks: Callable[[str], bool] = lambda _: False
 ) -> None:
-    """Raises UserError, naming `where` it is from, if tests would start a program that the user has not trusted.
+    """Raises UserError, naming `where` it is from, if tests would start a program that the user has
+    not trusted.
 
     `asks` puts a question to the user; a yes is remembered.
     """
@@ -208,12 +218,15 @@ def trusted_scenario(
 
 
 def check_cluster(cluster: str) -> None:
-    """Raises UserError for what is neither `here` nor a cluster that can be asked, and where Dask is not installed."""
+    """Raises UserError for what is neither `here` nor a cluster that can be asked, and where Dask
+    is not installed.
+    """
     if cluster == HERE:
         return
     if not (SCHEDULER.fullmatch(cluster) or hosts_of(cluster) or is_file(Path(cluster))):
         raise UserError(
-            f"options: reduction.cluster: expected here, tcp://HOST:PORT, tls://HOST:PORT, ssh:HOST1,HOST2 or the path of a "
+            "options: reduction.cluster: expected here, tcp://HOST:PORT, tls://HOST:PORT, "
+            "ssh:HOST1,HOST2 or the path of a "
             f"scheduler file that is there, found '{cluster}'"
         )
     if find_spec("distributed") is None:

@@ -1,7 +1,8 @@
-"""`python -m ddenv.scene RUN`: serves the 3-D scene of a run until it is stopped or its parent exits.
+"""`python -m ddenv.scene RUN`: serves the 3-D scene of a run until it is stopped or its parent
+exits.
 
-The first line of output is the URL; a line of input says what to show (`Wanted`). User errors are one line on standard error,
-with exit code 2.
+The first line of output is the URL; a line of input says what to show (`Wanted`). User errors are
+one line on standard error, with exit code 2.
 """
 
 from __future__ import annotations
@@ -54,7 +55,9 @@ async def _serve(run: RunFile, parent: int) -> None:
     os.set_blocking(sys.stdin.fileno(), False)
 
     def point() -> None:
-        """Shows what the last line of standard input asks for: a viewer writes each line at once."""
+        """Shows what the last line of standard input asks for: a viewer writes each line at
+        once.
+        """
         if not (said := os.read(sys.stdin.fileno(), 1 << 16)):
             loop.remove_reader(sys.stdin.fileno())
             return

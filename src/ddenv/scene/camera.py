@@ -1,4 +1,6 @@
-"""Places the camera and the sun: the path from start to goal fills the picture, seen at an angle from its right side."""
+"""Places the camera and the sun: the path from start to goal fills the picture, seen at an angle
+from its right side.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,8 @@ from ddenv.scene.draw import WORLD
 from ddenv.scene.stage import DRAWN, Stage
 from ddenv.world.pose import Pose, Vector, vector
 
-# A robot whose start and goal are nearer to each other than this, m, is small itself, as the hand of an arm is.
+# A robot whose start and goal are nearer to each other than this, m, is small itself, as the hand
+# of an arm is.
 NEAR = 1.5
 SMALLEST = 0.1
 FIELD_OF_VIEW = 38.0  # vertical, degrees
@@ -21,7 +24,9 @@ _CAMERA = ("Cameras", "default", "rotated", DRAWN)
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The camera looks at `center`, m; `camera` and `sun` are relative to it, m; `radius` is the visible distance around it, m."""
+    """The camera looks at `center`, m; `camera` and `sun` are relative to it, m; `radius` is the
+    visible distance around it, m.
+    """
 
     center: Vector
     camera: Vector

@@ -1,4 +1,6 @@
-"""Colours of models without their own, and of the marks that the scene adds: red, green, blue, alpha in 0..1."""
+"""Colours of models without their own, and of the marks that the scene adds: red, green, blue,
+alpha in 0..1.
+"""
 
 from __future__ import annotations
 

@@ -40,25 +40,30 @@ ABOVE = 0.05  # height of drawn trajectories above the robot's lowest point, m
 
 
 def safe_name(number: int, name: str) -> str:
-    """A name for the browser's tree: unique by its number, without special characters of paths or pages."""
+    """A name for the browser's tree: unique by its number, without special characters of paths or
+    pages.
+    """
     kept = "".join(char if char.isalnum() or char in "-_. " else "_" for char in name)[:40]
     return f"{number:03d} {kept}"
 
 
 def path_on_ground(samples: np.ndarray, lowest: float, above: float = ABOVE) -> np.ndarray:
-    """Points (N, 3) below a robot at rows (t, x, y, z, qw, qx, qy, qz) whose lowest point has z = `lowest` in its frame."""
+    """Points (N, 3) below a robot at rows (t, x, y, z, qw, qx, qy, qz) whose lowest point has z =
+    `lowest` in its frame.
+    """
     w, x, y, z = samples[:, 4:8].T
     up = np.column_stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
     return samples[:, 1:4] + (lowest + above) * up
 
 
-# The letter of a partition over a model: the letter, its colour as in CSS, where it belongs, x, y, z in m, and what the browser
-# calls the model, "" where it cannot move.
+# The letter of a partition over a model: the letter, its colour as in CSS, where it belongs, x, y,
+# z in m, and what the browser calls the model, "" where it cannot move.
 Letter = tuple[str, str, float, float, float, str]
 
 
 class Scenery:
-    """The objects of one run: elements that can move one by one, all others together, anew for each environment.
+    """The objects of one run: elements that can move one by one, all others together, anew for each
+    environment.
 
     A browser takes some 10 ms for each object of its own.
     """
@@ -107,7 +112,9 @@ class Scenery:
             self._stage.draw(path, thing, shadow=path[: len(MODELS)] == MODELS)
 
     def _together(self, shot: Shot) -> Iterator[tuple[Path, Object | None]]:
-        """What shows the elements that never move, and the edges of those that are gone; None where nothing is left to show."""
+        """What shows the elements that never move, and the edges of those that are gone; None where
+        nothing is left to show.
+        """
         items = [
             item for name, items in self._painted.items() if name in shot.models for item in items
         ]
@@ -128,7 +135,9 @@ class Scenery:
             self._stage.move((*ROBOT, wheel.key), wheel.pose(turned), newest_only=True)
 
     def place_models(self, poses: Mapping[str, Pose]) -> None:
-        """Puts the first links of these elements, and links at joints, at their poses, and all others where they start."""
+        """Puts the first links of these elements, and links at joints, at their poses, and all
+        others where they start.
+        """
         for name in self._placed - set(poses):
             self._stage.move((*MODELS, self.movers[name]), Pose())
         self._placed = frozenset(name for name in poses if name in self.movers)
@@ -156,13 +165,17 @@ class Scenery:
         )
 
     def still(self, shot: Shot) -> list[bytes]:
-        """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`keys`)."""
+        """The messages that show the environment of `shot` in one browser, but for elements that
+        have a name there (`keys`).
+        """
         return [self._stage.drawn(path, thing) for path, thing in self._together(shot)]
 
     def parts(self, groups: Iterable[tuple[str, Color, Iterable[str]]]) -> list[Letter]:
-        """Draws edges around the models of each partition: its letter, its colour, its models. Returns the first letters.
+        """Draws edges around the models of each partition: its letter, its colour, its models.
+        Returns the first letters.
 
-        They stand over the models where these start; the browser lets the letters and edges of models that can move follow them.
+        They stand over the models where these start; the browser lets the letters and edges of
+        models that can move follow them.
         """
         self._stage.delete(PARTS)
         places = list[Letter]()
@@ -182,7 +195,8 @@ class Scenery:
                 if listed:
                     css = f"#{colors.hexadecimal(color):06x}"
                     places.append((letter, css, float(x), float(y), float(high[2]), key))
-        # One object for each colour: of thousands of partitions, a browser would take minutes to make one each.
+        # One object for each colour: of thousands of partitions, a browser would take minutes to
+        # make one each.
         for number, (color, all_ends) in enumerate(edges.items()):
             self._stage.draw(
                 (*PARTS, str(number)), lines(np.concatenate(all_ends), color), shadow=False
@@ -236,7 +250,9 @@ class Scenery:
         return shape
 
     def _draw_ground(self, world: World) -> Pose | None:
-        """Draws the plane that is highest at the origin, which may slope. Returns its pose there; None without planes."""
+        """Draws the plane that is highest at the origin, which may slope. Returns its pose there;
+        None without planes.
+        """
         solids = [one for model in world.models if is_ground(model) for one in model.collisions]
         planes = [one.pose for one in solids if isinstance(one.shape, Plane)]
         places = [
@@ -307,7 +323,9 @@ def mark(
     scale: float = 1.0,
     inside: tuple[Surface, ...] = (),
 ) -> None:
-    """Draws a ring of `radius` m around `position`, with what stands `inside`, visible from afar and from above."""
+    """Draws a ring of `radius` m around `position`, with what stands `inside`, visible from afar
+    and from above.
+    """
     path = (*WORLD, name)
     shapes = [
         mesh.ring(radius, 0.05 * scale),

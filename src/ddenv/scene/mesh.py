@@ -1,6 +1,7 @@
 """Triangulates shapes, from sizes and poses (m) to arrays, and paints models with them.
 
-At a sharp edge each face has its own copy of a corner, since the browser averages the shading over shared corners.
+At a sharp edge each face has its own copy of a corner, since the browser averages the shading over
+shared corners.
 """
 
 from __future__ import annotations
@@ -33,15 +34,18 @@ from ddenv.world.pose import Point, Pose
 from ddenv.world.terrain import surface
 
 SIDES = 24  # of the polygon that stands for a circle
-# Minimum distance between points of a drawn trajectory, as part of its radius: a robot that stands still leaves one point.
+# Minimum distance between points of a drawn trajectory, as part of its radius: a robot that stands
+# still leaves one point.
 TUBE_STEP = 1.6
-# A corner of a mesh looks smooth if its faces deviate by less than this from their mean normal, rad.
+# A corner of a mesh looks smooth if its faces deviate by less than this from their mean normal,
+# rad.
 SMOOTH = math.radians(30.0)
 
 
 @dataclass(frozen=True)
 class Surface:
-    """`vertices` (N, 3) in m; `faces` (M, 3) are vertex indices, counterclockwise seen from outside.
+    """`vertices` (N, 3) in m; `faces` (M, 3) are vertex indices, counterclockwise seen from
+    outside.
 
     A painted one has the colours of its vertices, `tints` (N, 3), and one transparency.
     """
@@ -78,7 +82,9 @@ EMPTY = Surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32))
 
 
 def merge(surfaces: Sequence[Surface]) -> Surface:
-    """One surface with the faces of all `surfaces`, which are all painted, in one transparency, or not."""
+    """One surface with the faces of all `surfaces`, which are all painted, in one transparency, or
+    not.
+    """
     if not surfaces:
         return EMPTY
     starts = np.cumsum([0, *(len(one.vertices) for one in surfaces[:-1])])
@@ -92,7 +98,8 @@ def merge(surfaces: Sequence[Surface]) -> Surface:
     )
 
 
-# Corners of a box around the origin with sides of 1, numbered by their bits x, y, z, and the edges that join them.
+# Corners of a box around the origin with sides of 1, numbered by their bits x, y, z, and the edges
+# that join them.
 CORNERS = np.array([(x, y, z) for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)])
 EDGES = np.array(
     [(a, a | 1 << axis) for axis in range(3) for a in range(8) if not a >> axis & 1]
@@ -110,7 +117,9 @@ def box(size: Sequence[float]) -> Surface:
 
 
 def revolved(*profiles: Sequence[Point], sides: int = SIDES) -> Surface:
-    """The surface of profiles (radius, z), each from top to bottom, turned around z; between profiles the edge is sharp."""
+    """The surface of profiles (radius, z), each from top to bottom, turned around z; between
+    profiles the edge is sharp.
+    """
     angles = np.arange(sides) * 2 * math.pi / sides
     parts = []
     for profile in profiles:
@@ -135,7 +144,9 @@ def sphere(radius: float) -> Surface:
 
 
 def capsule(radius: float, length: float) -> Surface:
-    """A cylinder of `length` along z, centred on its frame's origin, with a hemisphere on each end."""
+    """A cylinder of `length` along z, centred on its frame's origin, with a hemisphere on each
+    end.
+    """
     top = _arc(radius, 0.0, math.pi / 2, SIDES // 4)
     bottom = _arc(radius, math.pi / 2, math.pi, SIDES // 4)
     return revolved(
@@ -181,7 +192,9 @@ def creased(mesh: Mesh) -> Surface:
 
 
 def tube(points: np.ndarray, radius: float) -> Surface:
-    """A tube along the path `points` (N, 3), thinned by `TUBE_STEP`; empty for a path without length."""
+    """A tube along the path `points` (N, 3), thinned by `TUBE_STEP`; empty for a path without
+    length.
+    """
     taken = list(points[:1])
     for point in points[1:]:
         if np.linalg.norm(point - taken[-1]) >= TUBE_STEP * radius:
@@ -205,7 +218,9 @@ def tube(points: np.ndarray, radius: float) -> Surface:
 
 
 def of_shape(shape: Shape) -> Surface:
-    """The surface of a shape in its own frame; empty for a plane, since the ground is drawn separately."""
+    """The surface of a shape in its own frame; empty for a plane, since the ground is drawn
+    separately.
+    """
     match shape:
         case Box(size):
             return box(size)
@@ -260,7 +275,9 @@ def _sheet(rows: int, columns: int) -> np.ndarray:
 
 
 def paint(model: Model) -> list[Surface]:
-    """All visuals of a model, in the frame of its poses, by transparency. A link without visuals shows its collisions."""
+    """All visuals of a model, in the frame of its poses, by transparency. A link without visuals
+    shows its collisions.
+    """
     groups: dict[float, list[Surface]] = {}
     default = colors.STILL if model.static else colors.MOVABLE
     shown: list[Visual | Collision] = [
@@ -275,7 +292,9 @@ def paint(model: Model) -> list[Surface]:
 
 
 def plain(shape: Surface, color: Color, *, glow: float = 0.0, offset: int = 0) -> meshcat.Mesh:
-    """An object of one colour. `glow` 0..1 is its own light; with `offset` above 0, others in the same plane are drawn over it."""
+    """An object of one colour. `glow` 0..1 is its own light; with `offset` above 0, others in the
+    same plane are drawn over it.
+    """
     options: Data = {}
     if glow:
         red, green, blue, _ = color
@@ -301,7 +320,9 @@ def lines(ends: np.ndarray, color: Color) -> meshcat.LineSegments:
 
 
 def outline(model: Model, shape: Surface) -> np.ndarray:
-    """Ends (24, 3) of the 12 edges of the box around `shape` in the axes of the model; world frame."""
+    """Ends (24, 3) of the 12 edges of the box around `shape` in the axes of the model; world
+    frame.
+    """
     own = shape.at(model.pose.inverse()).vertices
     low = own.min(axis=0)
     high = own.max(axis=0)

@@ -1,4 +1,6 @@
-"""Keeps the stage in step with the run file: reads events, chooses what to show, moves the robot."""
+"""Keeps the stage in step with the run file: reads events, chooses what to show, moves the
+robot.
+"""
 
 from __future__ import annotations
 
@@ -35,9 +37,11 @@ DIGITS = 5  # digits after the point: a hundredth of a millimetre
 
 
 class Player:
-    """Shows one run on a stage; a running test moves here, finished ones are played by the browser (`play`).
+    """Shows one run on a stage; a running test moves here, finished ones are played by the browser
+    (`play`).
 
-    `say(name=..., title=..., models=..., time=..., kind=..., test=..., parts=...)` receives the caption of the picture.
+    `say(name=..., title=..., models=..., time=..., kind=..., test=..., parts=...)` receives the
+    caption of the picture.
     """
 
     def __init__(self, run: RunFile, stage: Stage, say: Callable[..., None]) -> None:
@@ -84,11 +88,13 @@ class Player:
         self._position.go(wanted.at)
 
     def play(self, test: int) -> Data:
-        """A finished test for a browser: what is there, how it moves, and what the run file `lacks` of it, in sentences.
+        """A finished test for a browser: what is there, how it moves, and what the run file `lacks`
+        of it, in sentences.
 
-        `robot` has rows t (s), x, y, z (m), qx, qy, qz, qw; so has each of `moving`, by the browser's names, from where the model
-        started. `turned` has how far left and right wheels have turned at each row of the robot, rad, as its way makes them roll.
-        Raises UserError where the robot's way is missing or damaged.
+        `robot` has rows t (s), x, y, z (m), qx, qy, qz, qw; so has each of `moving`, by the
+        browser's names, from where the model started. `turned` has how far left and right wheels
+        have turned at each row of the robot, rad, as its way makes them roll. Raises UserError
+        where the robot's way is missing or damaged.
         """
         shot = self._shot_of(test)
         scenery = self._scenery
@@ -118,10 +124,12 @@ class Player:
         }
 
     def pairs(self) -> Data:
-        """What a browser may choose: how many tests there are, and pairs with the same seed that show why the robot fails.
+        """What a browser may choose: how many tests there are, and pairs with the same seed that
+        show why the robot fails.
 
-        There are none before fresh runs show it. The ghost's test is the last of a pair; `equal` is until when they are the same,
-        `apart` when the robots are visibly apart, both s; None if they never are.
+        There are none before fresh runs show it. The ghost's test is the last of a pair; `equal` is
+        until when they are the same, `apart` when the robots are visibly apart, both s; None if
+        they never are.
         """
         found: list[tuple[str, Parting | None]] = []
         with suppress(UserError):
@@ -150,7 +158,8 @@ class Player:
         return {"tests": len(self._state.tests), "pairs": pairs}
 
     def drawings(self, what: str, test: int) -> list[bytes]:
-        """The messages that draw for one browser what is `still` in a finished test, or the `way` or `ghost-way` of its robot.
+        """The messages that draw for one browser what is `still` in a finished test, or the `way`
+        or `ghost-way` of its robot.
 
         Raises UserError.
         """
@@ -183,8 +192,11 @@ class Player:
         return shot_of_test(start.after, "replay", state.test(test))
 
     def tick(self, now: float) -> None:
-        """Updates the stage to `now`, s of a monotonic clock. Raises UserError for a damaged run file."""
-        # A killed engine leaves its rows behind. Read rows before events, so that their tests are known.
+        """Updates the stage to `now`, s of a monotonic clock. Raises UserError for a damaged run
+        file.
+        """
+        # A killed engine leaves its rows behind. Read rows before events, so that their tests are
+        # known.
         self._live = (
             self._run.live() if self._wanted.at is None and engine_is_alive(self._run.path) else []
         )
@@ -251,7 +263,9 @@ class Player:
         self._say(name=self._name, title=shot.title, models=models, time=time, **here)
 
     def _show_parts(self) -> None:
-        """Marks the partitions of the round that goes on, in the colours and with the letters of the map."""
+        """Marks the partitions of the round that goes on, in the colours and with the letters of
+        the map.
+        """
         round = None if self._state.ended else self._state.round
         parts = () if round is None or round.done else tuple(round.split.lettered)
         if parts == self._parts:

@@ -1,12 +1,15 @@
-"""Serves the scene to browsers on this machine: a page, Meshcat's viewer, and a websocket that feeds it.
+"""Serves the scene to browsers on this machine: a page, Meshcat's viewer, and a websocket that
+feeds it.
 
-Meshcat's own server listens on all interfaces, accepts drawing commands from any local program, and keeps every property
-ever set. This one listens on the loopback interface only, accepts no commands, and lets no foreign page read the scene. Its address
-has a token, so that other users of this machine cannot watch.
+Meshcat's own server listens on all interfaces, accepts drawing commands from any local program, and
+keeps every property ever set. This one listens on the loopback interface only, accepts no commands,
+and lets no foreign page read the scene. Its address has a token, so that other users of this
+machine cannot watch.
 
-The address of each run is remembered: pages that are still open come back to a scene that is started again there. A page must not
-tell its token to whoever has taken the port meanwhile. So it first asks for a proof: who serves the port has to sign a challenge
-with the token, and with its own port, so that nobody can have another scene sign.
+The address of each run is remembered: pages that are still open come back to a scene that is
+started again there. A page must not tell its token to whoever has taken the port meanwhile. So it
+first asks for a proof: who serves the port has to sign a challenge with the token, and with its own
+port, so that nobody can have another scene sign.
 """
 
 from __future__ import annotations
@@ -59,7 +62,9 @@ _CROWDED = 100
 
 
 class Server:
-    """Sends the scene to all browsers. `welcome()` returns the messages that a new browser needs first."""
+    """Sends the scene to all browsers. `welcome()` returns the messages that a new browser needs
+    first.
+    """
 
     def __init__(self, token: str = "") -> None:
         self.viewers: set[_Feed] = set()
@@ -102,7 +107,9 @@ class Server:
             logging.getLogger(name).setLevel(logging.ERROR)
 
     def listen(self, before: int = 0) -> str:
-        """Starts on the port `before`, or else the first free one from `FIRST_PORT` up; returns the URL. Raises UserError."""
+        """Starts on the port `before`, or else the first free one from `FIRST_PORT` up; returns the
+        URL. Raises UserError.
+        """
         for number in filter(None, (before, *range(FIRST_PORT, FIRST_PORT + TRIES))):
             try:
                 sockets = tornado.netutil.bind_sockets(number, LOOPBACK)
@@ -196,13 +203,15 @@ class _Feed(tornado.websocket.WebSocketHandler):
         self._on_the_way = 0
 
     async def get(self, *args: str, **kwargs: str) -> None:
-        # Tornado's own check would let in a page whose host name was made to resolve to this machine (DNS rebinding).
+        # Tornado's own check would let in a page whose host name was made to resolve to this
+        # machine (DNS rebinding).
         if not self.check_origin(self.request.headers.get("Origin", f"http://{LOOPBACK}")):
             raise tornado.web.HTTPError(403)
         await super().get(*args, **kwargs)
 
     def check_origin(self, origin: str) -> bool:
-        # Any page in the user's browser can reach a loopback port; only our own page may read, also through a tunnel.
+        # Any page in the user's browser can reach a loopback port; only our own page may read, also
+        # through a tunnel.
         try:
             return urlsplit(origin).hostname in _LOCAL_NAMES
         except ValueError:
@@ -240,7 +249,9 @@ class _Feed(tornado.websocket.WebSocketHandler):
 
 
 def last_address(run: Path) -> tuple[int, str]:
-    """The port, 0 for none, and the token with which the scene of `run` was served last; a new token if there was none."""
+    """The port, 0 for none, and the token with which the scene of `run` was served last; a new
+    token if there was none.
+    """
     match _known().get(str(run.resolve())):
         case [int(port), str(token)] if 0 < port <= 65535 and _TOKEN.fullmatch(token):
             return port, token

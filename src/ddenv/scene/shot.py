@@ -1,4 +1,6 @@
-"""What the scene shows: pure functions from the run's state and running tests to a `Shot`, with their titles."""
+"""What the scene shows: pure functions from the run's state and running tests to a `Shot`, with
+their titles.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,11 @@ HOLD = 3.0  # how long a finished test stays on screen until the next one starts
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shot:
-    """What is shown: a running test ("live"), a replay of a finished one ("replay"), or the robot at its start ("start").
+    """What is shown: a running test ("live"), a replay of a finished one ("replay"), or the robot
+    at its start ("start").
 
-    Elements: `models` are in the test, `left_out` in the environment but not in the test, `removed` are removed.
+    Elements: `models` are in the test, `left_out` in the environment but not in the test, `removed`
+    are removed.
     """
 
     kind: str
@@ -31,7 +35,9 @@ class Shot:
 def shot(
     state: RunState, live: Sequence[Live], previous: Shot | None = None, idle: float = math.inf
 ) -> Shot:
-    """What to show, `idle` s after a test was last running. Stays with the `previous` test while it runs."""
+    """What to show, `idle` s after a test was last running. Stays with the `previous` test while it
+    runs.
+    """
     running = [
         test for test in state.tests_of(row.test for row in live) if test.outcome == "running"
     ]
@@ -53,7 +59,9 @@ def shot(
 
 
 def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Shot:
-    """What to show of a candidate or a try: the test that runs, or the last one that showed f, or the last one that ended."""
+    """What to show of a candidate or a try: the test that runs, or the last one that showed f, or
+    the last one that ended.
+    """
     tests = state.tests_of(row.tests)
     # At an earlier moment of the run, what ran then has ended by now.
     running = [test for test in tests if test.outcome == "running"]

@@ -1,6 +1,7 @@
 """The scene in the browsers: a tree of objects by path, sent as messages of Meshcat's protocol.
 
-The stage keeps the latest message of each kind for each path, so that a browser that connects later gets the whole scene.
+The stage keeps the latest message of each kind for each path, so that a browser that connects later
+gets the whole scene.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ DRAWN = "<object>"  # at every path, the viewer keeps the object itself in a chi
 
 
 class Stage:
-    """`send(message, newest_only)` sends a message to the browsers; for slow ones, a `newest_only` message may be dropped."""
+    """`send(message, newest_only)` sends a message to the browsers; for slow ones, a `newest_only`
+    message may be dropped.
+    """
 
     def __init__(self, send: Callable[[bytes, bool], None]) -> None:
         self._send = send
@@ -76,7 +79,9 @@ class Stage:
             self._send(umsgpack.packb({"type": "delete", "path": _text(path)}), False)
 
     def drawn(self, path: Path, thing: Object | None) -> bytes:
-        """The message that draws `thing` at `path`, or None deletes what is there, for one browser alone: it is not kept."""
+        """The message that draws `thing` at `path`, or None deletes what is there, for one browser
+        alone: it is not kept.
+        """
         command = (
             {"type": "delete"} if thing is None else {"type": "set_object", "object": thing.lower()}
         )

@@ -18,7 +18,8 @@ from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector, pose_of
 from ddenv.world.scenario import Wheels as Named
 
-# Spokes, so that a plain wheel is seen to turn: their width, as part of its radius, and how far they stand out of it, m.
+# Spokes, so that a plain wheel is seen to turn: their width, as part of its radius, and how far
+# they stand out of it, m.
 SPOKE = 0.12
 OUT = 0.003
 SPOKE_COLOR = (0.75, 0.76, 0.78, 1.0)
@@ -26,7 +27,8 @@ SPOKE_COLOR = (0.75, 0.76, 0.78, 1.0)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Wheel:
-    """A wheel: its name in the browser, what is drawn around its centre, and in the first link's frame its place and `axis`.
+    """A wheel: its name in the browser, what is drawn around its centre, and in the first link's
+    frame its place and `axis`.
 
     `side` is 0 on the left, 1 on the right. It turns about `axis` as it rolls forward.
     """
@@ -45,7 +47,9 @@ class Wheel:
 
 
 class Wheels:
-    """The wheels of a robot; none if it has no wheels on two sides, as a robot of another simulator may."""
+    """The wheels of a robot; none if it has no wheels on two sides, as a robot of another simulator
+    may.
+    """
 
     def __init__(self, robot: Model, named: Named | None = None, skid: float = 1.0) -> None:
         """`named` and `skid` are the scenario's wheels and the skid of its controller."""
@@ -67,7 +71,9 @@ class Wheels:
         )
 
     def turned(self, rows: np.ndarray) -> np.ndarray:
-        """How far left and right wheels have turned at each row of a motion, shape (N, 2), rad; see `rolled`."""
+        """How far left and right wheels have turned at each row of a motion, shape (N, 2), rad; see
+        `rolled`.
+        """
         return (
             np.zeros((len(rows), 2))
             if self._drive is None

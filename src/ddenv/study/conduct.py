@@ -1,4 +1,6 @@
-"""A study from start to end: makes the remaining cells, several at the same time, each with its own engine, and shows progress."""
+"""A study from start to end: makes the remaining cells, several at the same time, each with its own
+engine, and shows progress.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ QUIET = 60.0
 
 
 class Work:
-    """A cell in work by so many `workers`; its run was as `before`. `problem` says why it did not end this time."""
+    """A cell in work by so many `workers`; its run was as `before`. `problem` says why it did not
+    end this time.
+    """
 
     def __init__(self, folder: Path, cell: Cell, workers: int) -> None:
         self.cell = cell
@@ -69,18 +73,22 @@ class Work:
 
     def has_ended(self) -> bool:
         """Whether no engine works on it any more."""
-        # This comes before the events are read, so none is missed. Where the engine of a killed study works, ours gave up.
+        # This comes before the events are read, so none is missed. Where the engine of a killed
+        # study works, ours gave up.
         at_work = self.engine.poll() is None or engine_is_alive(self.path)
         self.catch_up()
         if not at_work and self.state.status != "finished":
-            # If an engine died before it wrote anything, the reason in the file is an earlier engine's.
+            # If an engine died before it wrote anything, the reason in the file is an earlier
+            # engine's.
             said = self.state.ended and self.state.revision > self.before.revision
             self.problem = self.state.reason if said else last_words(self.path)
         return not at_work
 
 
 def is_done(folder: Path, cell: Cell) -> bool:
-    """Whether nothing is left to do for a cell. Raises UserError if its run file has other settings."""
+    """Whether nothing is left to do for a cell. Raises UserError if its run file has other
+    settings.
+    """
     path = run_path(folder, cell)
     if not path.exists():
         return False
@@ -96,7 +104,8 @@ def is_done(folder: Path, cell: Cell) -> bool:
         )
     if state.status != "finished" or engine_is_alive(path):
         return False
-    # Where the baseline, or a claim of the certificate, is open since tests broke, an engine makes them again.
+    # Where the baseline, or a claim of the certificate, is open since tests broke, an engine makes
+    # them again.
     if state.baseline is None:
         return not all(test.broke for test in state.finished_tests)
     certificate = current(state)
@@ -104,8 +113,8 @@ def is_done(folder: Path, cell: Cell) -> bool:
 
 
 class Runner:
-    """One session of work on the study `plan` in `folder`: makes `cells` with `jobs` workers in all, and says and records how far
-    it is. Raises UserError if earlier sessions cannot be read.
+    """One session of work on the study `plan` in `folder`: makes `cells` with `jobs` workers in
+    all, and says and records how far it is. Raises UserError if earlier sessions cannot be read.
     """
 
     def __init__(
@@ -134,8 +143,8 @@ class Runner:
     def run(self) -> None:
         """Makes the cells.
 
-        On KeyboardInterrupt the engines are stopped, and it is raised again. Raises UserError if a run file cannot be created, and
-        then stops the engines, too.
+        On KeyboardInterrupt the engines are stopped, and it is raised again. Raises UserError if a
+        run file cannot be created, and then stops the engines, too.
         """
         # Ignored signals stay ignored: a study under nohup outlives its terminal.
         asked = [
@@ -231,15 +240,20 @@ class Runner:
             doing = f"{len(state.environment)} of {len(state.elements)} models, "
             doing += f"{'certificate, ' if state.confirming else ''}{state.tests_done} tests"
             if state.baseline is None:
-                doing = f"{state.tests_done} of {work.cell.scenario.reduction.baseline_runs} baseline runs"
+                doing = (
+                    f"{state.tests_done} of {work.cell.scenario.reduction.baseline_runs} "
+                    "baseline runs"
+                )
             said.append(f"{work.cell.label}: {doing}")
         return " · ".join(said)
 
 
 def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
-    """Makes the missing cells of a study in `folder` with `jobs` workers, and writes its results; returns the exit code.
+    """Makes the missing cells of a study in `folder` with `jobs` workers, and writes its results;
+    returns the exit code.
 
-    0 means that every cell is certified to be minimal, 1 that not all are, 130 that it was interrupted. Raises UserError.
+    0 means that every cell is certified to be minimal, 1 that not all are, 130 that it was
+    interrupted. Raises UserError.
     """
     for scenario in plan.scenarios:
         # A world or a robot that cannot be read is said before anything is made.

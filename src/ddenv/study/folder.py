@@ -51,7 +51,9 @@ def opened(folder: Path) -> Iterator[None]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Session:
-    """One session of work on the study. `begun` is Unix time, s; `seconds` and `tests` count this session so far."""
+    """One session of work on the study. `begun` is Unix time, s; `seconds` and `tests` count this
+    session so far.
+    """
 
     begun: float
     seconds: float
@@ -81,7 +83,9 @@ def write_sessions(folder: Path, all_of_them: tuple[Session, ...]) -> None:
 
 
 def versions() -> str:
-    """The versions of ddenv, Python and the packages that compute: another one may give another result."""
+    """The versions of ddenv, Python and the packages that compute: another one may give another
+    result.
+    """
     packages = processor.versions("drake", "numpy", "scipy", "scikit-learn")
     return f"ddenv {__version__}, Python {platform.python_version()}, {packages}"
 

@@ -1,4 +1,6 @@
-"""The cells of a study: each is one reduction of a scenario by an algorithm with a pair, from one seed."""
+"""The cells of a study: each is one reduction of a scenario by an algorithm with a pair, from one
+seed.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,8 @@ PAIRS = (
 )
 # A seed is less.
 MOST_SEED = 2**31
-# Between the seeds of a scenario. Run i has seed + i: the search has few runs, certificates have those from `FIRST_FRESH_RUN` on.
+# Between the seeds of a scenario. Run i has seed + i: the search has few runs, certificates have
+# those from `FIRST_FRESH_RUN` on.
 SEEDS_APART = 10 * FIRST_FRESH_RUN
 # The folder of the runs, in that of the study.
 RUNS = "runs"
@@ -47,7 +50,9 @@ class Method:
 
     @property
     def parts(self) -> tuple[str, str]:
-        """The partitioning and the prioritization, "" for a part that the algorithm does not use."""
+        """The partitioning and the prioritization, "" for a part that the algorithm does not
+        use.
+        """
         parts = dict(zip(schemas.BOTH, self.pair.split("/"), strict=True))
         partitioning, prioritization = (
             parts[k] if k in schemas.uses(self.algorithm) else "" for k in schemas.BOTH
@@ -67,7 +72,9 @@ class Method:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One reduction. `seed` is that of its first run; `scenario` has all settings, the seed and the method included."""
+    """One reduction. `seed` is that of its first run; `scenario` has all settings, the seed and the
+    method included.
+    """
 
     scenario: Scenario
     method: Method
@@ -106,7 +113,9 @@ def file_name(scenario: Scenario) -> str:
 
 @dataclass(frozen=True)
 class Plan:
-    """A whole study: `scenarios` as in their files, `methods` in the order of the tables, and how many `seeds` of each."""
+    """A whole study: `scenarios` as in their files, `methods` in the order of the tables, and how
+    many `seeds` of each.
+    """
 
     scenarios: tuple[Scenario, ...]
     methods: tuple[Method, ...]
@@ -114,7 +123,9 @@ class Plan:
 
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
-        """All cells in the order of the tables: without slices, and then with them if the scenario uses them."""
+        """All cells in the order of the tables: without slices, and then with them if the scenario
+        uses them.
+        """
         return tuple(
             self._cell(scenario, method, number, slices)
             for scenario in self.scenarios
@@ -129,7 +140,8 @@ class Plan:
         seed = scenario.reduction.seed + number * SEEDS_APART
         if seed >= MOST_SEED:
             raise UserError(
-                f"--seeds: the last seed of {scenario.name} would be {seed}; the maximum is {MOST_SEED - 1}"
+                f"--seeds: the last seed of {scenario.name} would be {seed}; the maximum is "
+                f"{MOST_SEED - 1}"
             )
         own = {"algorithm": method.algorithm, "pair": method.pair, "seed": seed, "slice": slices}
         reduction = scenario.reduction.model_copy(update=own)
@@ -165,13 +177,16 @@ def make_plan(
     plan = Plan(loaded, tuple(methods.values()), seeds)
     if len({cell.name for cell in plan.cells}) < len(plan.cells):
         raise UserError(
-            "--scenarios: the names of two of them make the same file names; give each a name of its own"
+            "--scenarios: the names of two of them make the same file names; give each a name of "
+            "its own"
         )
     return plan
 
 
 def scenario_names(words: Sequence[str]) -> Names:
-    """The names or files of the scenarios, each once; the paper's three if none is given. Raises UserError."""
+    """The names or files of the scenarios, each once; the paper's three if none is given. Raises
+    UserError.
+    """
     return _names("--scenarios", ",".join(words)) if words else SCENARIOS
 
 

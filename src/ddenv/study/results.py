@@ -1,4 +1,6 @@
-"""What a cell came to, read from its run file, and the rows of the tables: the results of a method, one for each seed."""
+"""What a cell came to, read from its run file, and the rows of the tables: the results of a method,
+one for each seed.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,9 @@ from ddenv.world.scenario import Scenario
 
 
 def difference(file: RunFile, cell: Cell) -> str:
-    """How the run file differs from the cell, "" if it does not. Raises UserError if it cannot be read."""
+    """How the run file differs from the cell, "" if it does not. Raises UserError if it cannot be
+    read.
+    """
     first = next((recorded.event for recorded in file.events(most=1)), None)
     if not isinstance(first, Created):
         raise UserError(f"{file.path}: damaged run file: it does not begin with its scenario")
@@ -67,15 +71,19 @@ def _compared(scenario: object) -> object:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """`tests` are the baseline and the tests behind each verdict of the search, `reruns` of them re-runs; `certificate_tests` are
-    those that the certificates rest on. They do not depend on the number of workers; tests made `ahead` of time and not needed do.
+    """`tests` are the baseline and the tests behind each verdict of the search, `reruns` of them
+    re-runs; `certificate_tests` are those that the certificates rest on. They do not depend on the
+    number of workers; tests made `ahead` of time and not needed do.
 
-    `minimal`: the certificate shows it; `problem` says why not, "" if it does. `sizes` are (tests of the search, models left) from
-    the end of the baseline on. `seconds` and `certificate_seconds` are the times of these tests, one after another. `taken_over`
-    of all tests were reused from other cells. `whole_f` of `whole_runs` of the counted runs of the whole world showed f. A
-    candidate without f cost `misses` tests at least. `steps_back`: how often the run went back because the rate of f was lost.
+    `minimal`: the certificate shows it; `problem` says why not, "" if it does. `sizes` are (tests
+    of the search, models left) from the end of the baseline on. `seconds` and `certificate_seconds`
+    are the times of these tests, one after another. `taken_over` of all tests were reused from
+    other cells. `whole_f` of `whole_runs` of the counted runs of the whole world showed f. A
+    candidate without f cost `misses` tests at least. `steps_back`: how often the run went back
+    because the rate of f was lost.
 
-    `simulated` and `certificate_simulated` are those of them that no other run implied, with the audits of slices.
+    `simulated` and `certificate_simulated` are those of them that no other run implied, with the
+    audits of slices.
     """
 
     cell: Cell
@@ -112,8 +120,8 @@ class Result:
     def bound(self) -> int:
         """The minimum of tests for any search that ends here, without its certificate.
 
-        After the baseline, f has to show once in what is left, and each of its models has to be left out without success, alone or
-        with others that are not left, with `misses` tests each.
+        After the baseline, f has to show once in what is left, and each of its models has to be
+        left out without success, alone or with others that are not left, with `misses` tests each.
         """
         shown_once = int(len(self.left) < len(self.elements))
         return (
@@ -170,7 +178,8 @@ def _read(file: RunFile, cell: Cell) -> Result:
         if state.ended
         else "has not ended"
     )
-    # A certificate runs the whole world only where what is left missed f: its runs would show the rate as too low.
+    # A certificate runs the whole world only where what is left missed f: its runs would show the
+    # rate as too low.
     whole = [
         test.outcome
         for test in tests
@@ -205,7 +214,9 @@ def _read(file: RunFile, cell: Cell) -> Result:
 
 
 class Paper(NamedTuple):
-    """A row of the paper: the number of its table, tests, which part of the models was removed, and minutes."""
+    """A row of the paper: the number of its table, tests, which part of the models was removed, and
+    minutes.
+    """
 
     table: str
     tests: int
@@ -230,7 +241,9 @@ def paper_row(cell: Cell) -> Paper | None:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The results of a method in a scenario, in the order of their seeds: `results` without slices, and `sliced` with them."""
+    """The results of a method in a scenario, in the order of their seeds: `results` without slices,
+    and `sliced` with them.
+    """
 
     scenario: Scenario
     method: Method
@@ -258,7 +271,9 @@ class Row:
 
     @property
     def bound(self) -> float | None:
-        """The minimum of tests for any method to find this result, the median of the seeds; None if nothing is minimal."""
+        """The minimum of tests for any method to find this result, the median of the seeds; None if
+        nothing is minimal.
+        """
         return median(result.bound for result in self.minimal) if self.minimal else None
 
     @property
@@ -268,7 +283,9 @@ class Row:
 
     @property
     def certain(self) -> float | None:
-        """The tests of a method that is certified with all seeds; None for another, which is no success."""
+        """The tests of a method that is certified with all seeds; None for another, which is no
+        success.
+        """
         return self.tests if self.certified else None
 
 

@@ -1,4 +1,6 @@
-"""The pages of a study: the result in a few words, a section for each scenario, a comparison of methods, how it was made."""
+"""The pages of a study: the result in a few words, a section for each scenario, a comparison of
+methods, how it was made.
+"""
 
 from __future__ import annotations
 
@@ -107,10 +109,14 @@ def content(
 def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Paragraph]:
     shares = sorted({result.cell.scenario.reduction.certify_rate for result in results})
     yield say(
-        "A robot fails in a world of many models. Each cell of this study reduces such a world, by one method, to the few "
-        "models that make the robot fail: it runs smaller and smaller parts, keeps those that show the same failure f, and "
-        "stops when no single model can be left out. Runs with fresh seeds then check the result: it is certified if "
-        f"it keeps at least {' or '.join(map(percent_at_least, shares))} of the whole world's failure rate, and less without "
+        "A robot fails in a world of many models. Each cell of this study reduces such a world, "
+        "by one method, to the few "
+        "models that make the robot fail: it runs smaller and smaller parts, keeps those that "
+        "show the same failure f, and "
+        "stops when no single model can be left out. Runs with fresh seeds then check the "
+        "result: it is certified if "
+        f"it keeps at least {' or '.join(map(percent_at_least, shares))} of the whole world's "
+        "failure rate, and less without "
         "any one of its models."
     )
     beside = [
@@ -124,9 +130,12 @@ def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Para
             duration(sum(getattr(result, time) for result, _ in beside)) for time in TIMES
         )
         yield say(
-            f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, no more "
-            f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take {ours}, and the certificates {more}. "
-            "The worlds and the simulator differ from the paper's: compare the methods with each other."
+            f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much "
+            f"removed in {better}, no more "
+            f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take "
+            f"{ours}, and the certificates {more}. "
+            "The worlds and the simulator differ from the paper's: compare the methods with each "
+            "other."
         )
     if missing := len(results) - len(minimal):
         yield say(f"{count(missing, 'cell')} not certified: the tables say why.", notice=True)
@@ -135,7 +144,9 @@ def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Para
 def write_study(
     plan: Plan, folder: Path, sessions: Sequence[Session]
 ) -> tuple[Path, tuple[Result, ...]]:
-    """Writes `study.html`, `study.md` with its figures, and `study.csv`; returns the page and its results. Raises UserError."""
+    """Writes `study.html`, `study.md` with its figures, and `study.csv`; returns the page and its
+    results. Raises UserError.
+    """
     results = tuple(read_cell(folder, cell) for cell in plan.cells)
     report = content(plan, results, sessions, folder)
     texts = {f"{STEM}.csv": table(folder, results), **pictures(report, STEM)}
@@ -267,6 +278,7 @@ def _computed(results: Sequence[Result]) -> Iterator[Block]:
         yield say(f"Different versions computed parts of it: {'; '.join(versions)}.", notice=True)
     if taken:
         yield say(
-            f"{thousands(taken)} tests were reused from another cell with the same models and the same seed: the simulation is "
+            f"{thousands(taken)} tests were reused from another cell with the same models and "
+            "the same seed: the simulation is "
             "deterministic to the last bit. They count in each cell, including their time."
         )

@@ -1,4 +1,6 @@
-"""The tables and charts of a study: which method is best where, and our numbers beside the paper's."""
+"""The tables and charts of a study: which method is best where, and our numbers beside the
+paper's.
+"""
 
 from __future__ import annotations
 
@@ -34,9 +36,11 @@ from ddenv.text import Names, count, plain
 HEIGHT = 320.0
 LINE = 22.0
 SAMPLE = 30.0
-# Widths of the lines of methods with their own colour: where lines coincide, the wider first ones stay visible.
+# Widths of the lines of methods with their own colour: where lines coincide, the wider first ones
+# stay visible.
 WIDTHS = (9.0, 5.0, 2.4, 2.2, 2.0, 2.0)
-# The maximum number of worlds drawn for a scenario, of models named for each and in a table, and of cells named for a problem.
+# The maximum number of worlds drawn for a scenario, of models named for each and in a table, and of
+# cells named for a problem.
 MOST_WORLDS = 4
 MOST_LEFT = 12
 MOST_NAMES = 8
@@ -44,10 +48,14 @@ MOST_CELLS = 3
 # A comparison needs at least this many methods.
 FEWEST = 4
 BOUNDS = (
-    "Search tests, the baseline included; certificates cost about the same after each method. Ranked by the ratio of tests to "
-    "the bound (geometric mean over the scenarios); a method that is not certified with every seed is not ranked. No "
-    "search needs fewer tests: after the baseline, f has to show in what is left, and each of its models has to be left out "
-    "without success, with as many runs as a candidate without f takes. The mark (◂) shows the fewest tests."
+    "Search tests, the baseline included; certificates cost about the same after each method. "
+    "Ranked by the ratio of tests to "
+    "the bound (geometric mean over the scenarios); a method that is not certified with every "
+    "seed is not ranked. No "
+    "search needs fewer tests: after the baseline, f has to show in what is left, and each of "
+    "its models has to be left out "
+    "without success, with as many runs as a candidate without f takes. The mark (◂) shows the "
+    "fewest tests."
 )
 
 
@@ -66,7 +74,8 @@ def chart(rows: Sequence[Row]) -> str:
     own = [row for row in rows if row.over]
     others = list[Row]()
     if len(own) > len(WIDTHS):
-        # With a colour of their own: the paper's methods, in their order, and those with the fewest tests.
+        # With a colour of their own: the paper's methods, in their order, and those with the fewest
+        # tests.
         own.sort(key=lambda row: (0,) if row.paper else (1, not row.certified, row.tests or 0.0))
         others = own[len(WIDTHS) :]
         own = own[: len(WIDTHS)]
@@ -89,7 +98,8 @@ def chart(rows: Sequence[Row]) -> str:
             if width:
                 x, y = at(*corners[-1])
                 lines.append(
-                    f'<circle class="{look} tip" cx="{x:.1f}" cy="{y:.1f}" r="{1.5 + width / 2:g}"/>'
+                    f'<circle class="{look} tip" cx="{x:.1f}" cy="{y:.1f}" '
+                    f'r="{1.5 + width / 2:g}"/>'
                 )
     legend = [
         (look, wide, escape(plain(_line_end(row)))) for look, wide, _, row in looks[len(others) :]
@@ -109,11 +119,16 @@ def _line_end(row: Row) -> str:
         return f"{row.method.label}, {len(row.minimal)} of {len(row.results)} seeds certified"
     (only,) = row.over
     doubt = "" if only.minimal else ", not certified"
-    return f"{row.method.label}: {count(len(only.left), 'model')} left after {count(only.tests, 'test')}{doubt}"
+    return (
+        f"{row.method.label}: {count(len(only.left), 'model')} left after "
+        f"{count(only.tests, 'test')}{doubt}"
+    )
 
 
 def worlds(folder: Path, rows: Sequence[Row], file: str) -> Iterator[Block]:
-    """A map of each set of models that is left, the certified and frequent ones first; `file` is part of the pictures' names."""
+    """A map of each set of models that is left, the certified and frequent ones first; `file` is
+    part of the pictures' names.
+    """
     ends = defaultdict[Names, list[Result]](list)
     for result in over(rows):
         ends[result.left].append(result)
@@ -156,7 +171,10 @@ def section(folder: Path, rows: Sequence[Row]) -> Section:
     blocks: list[Block] = [say(plain(scenario.description))] if scenario.description else []
     blocks += [numbers(rows), *_problems(rows)]
     if over(rows):
-        caption = "Models left after each test of the search, a line for each method (the paper's Figure 2):"
+        caption = (
+            "Models left after each test of the search, a line for each method (the paper's "
+            "Figure 2):"
+        )
         blocks += [behind(rows), say(caption), Picture(f"figure-2-{file}", chart(rows), caption)]
     blocks += worlds(folder, rows, file)
     return Section(title, tuple(blocks))
@@ -168,7 +186,9 @@ def _table(rows: Sequence[Sequence[tuple[str, Cell]]], right: Collection[int]) -
 
 
 def numbers(rows: Sequence[Row]) -> Table:
-    """Whether the result is certified; tests, reduction and minutes, beside the paper's if it has them."""
+    """Whether the result is certified; tests, reduction and minutes, beside the paper's if it has
+    them.
+    """
     beside = any(row.paper for row in rows)
     slices = any(row.sliced for row in rows)
     cells = [list(_numbers(row, beside, slices)) for row in rows]
@@ -209,7 +229,9 @@ def _whole(value: float) -> str:
 
 
 def behind(rows: Sequence[Row]) -> Table:
-    """Details: re-runs, what is left, how often f shows in it, in the whole world and without one of the models."""
+    """Details: re-runs, what is left, how often f shows in it, in the whole world and without one
+    of the models.
+    """
     return _table([list(_behind(row)) for row in rows], (1, 6, 7))
 
 
@@ -239,8 +261,8 @@ def _behind(row: Row) -> Iterator[tuple[str, Cell]]:
 
 
 def _rate(parts: Sequence[tuple[int, int]]) -> str:
-    """Runs that showed f, of how many, with the 95 % interval, which holds although the runs decided how many there were:
-    "9 of 10 (51 % to >99 %)".
+    """Runs that showed f, of how many, with the 95 % interval, which holds although the runs
+    decided how many there were: "9 of 10 (51 % to >99 %)".
     """
     shown, runs = (sum(part[number] for part in parts) for number in (0, 1))
     if not runs:
@@ -296,7 +318,8 @@ def best(scenarios: Sequence[Sequence[Row]]) -> Section | None:
     table: list[tuple[Cell, ...]] = [("minimum for a search that ends there", *least, "1.0")]
     ranked = []
     for rows in zip(*scenarios, strict=True):
-        # Each scenario has the same weight, whatever its number of tests. Methods not certified everywhere come last.
+        # Each scenario has the same weight, whatever its number of tests. Methods not certified
+        # everywhere come last.
         ratios = [row.certain / row.bound for row in rows if row.certain is not None and row.bound]
         times = geometric_mean(ratios) if len(ratios) == len(rows) else math.inf
         cells = [_cell(row, few) for row, few in zip(rows, fewest, strict=True)]

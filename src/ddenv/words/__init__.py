@@ -1,1 +1,3 @@
-"""What happens in a run, in words: the same lines on the terminal, on the screens and in reports."""
+"""What happens in a run, in words: the same lines on the terminal, on the screens and in
+reports.
+"""

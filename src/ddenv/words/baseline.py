@@ -1,4 +1,6 @@
-"""What the baseline showed: how often the whole world fails, in which ways, and what that means for flaky candidates."""
+"""What the baseline showed: how often the whole world fails, in which ways, and what that means for
+flaky candidates.
+"""
 
 from __future__ import annotations
 
@@ -44,17 +46,25 @@ def failed_in(state: RunState, found: BaselineFinished) -> str:
 
 
 def missed(state: RunState) -> str:
-    """How likely all runs of a candidate miss f, by the baseline's rate and its interval; without a full stop."""
+    """How likely all runs of a candidate miss f, by the baseline's rate and its interval; without a
+    full stop.
+    """
     base = state.baseline
     asked = settings(state)
     if base is None:
         return ""
     if asked.accept_rate == "exact":
-        return f"each candidate runs with the seeds of {min(asked.exact_seeds, base.failures)} of these failing runs"
+        return (
+            f"each candidate runs with the seeds of {min(asked.exact_seeds, base.failures)} of "
+            "these failing runs"
+        )
     middle, most = (percent(miss_chance(rate, asked.iterations)) for rate in (base.rate, base.low))
     chance = middle if middle == most else f"{middle} (at most {most})"
     rare = base.iterations_95 > asked.iterations
     enough = (
         f"; for a 95 % chance of seeing f, use --iterations {base.iterations_95}" if rare else ""
     )
-    return f"the chance that {count(1 + asked.iterations, 'run')} of a candidate miss f is {chance}{enough}"
+    return (
+        f"the chance that {count(1 + asked.iterations, 'run')} of a candidate miss f is "
+        f"{chance}{enough}"
+    )

@@ -1,4 +1,6 @@
-"""What a run may claim of its result: said here alone, from the runs that show it, with their number and interval."""
+"""What a run may claim of its result: said here alone, from the runs that show it, with their
+number and interval.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +47,10 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     """
     left, *removals = certificate.claims
     if left.verdict == "lost":
-        return f"what is left keeps less than {percent(certificate.keep_rate)} of {_whole_rate(certificate)}: {rate(left)}"
+        return (
+            f"what is left keeps less than {percent(certificate.keep_rate)} of "
+            f"{_whole_rate(certificate)}: {rate(left)}"
+        )
     if left.verdict != "kept" and not certificate.seeds:
         aim = f"{percent_at_least(certificate.certify_rate)} of {_whole_rate(certificate)}"
         shown = f"; it keeps at least {percent_at_least(left.bound)}" if left.bound else ""
@@ -64,7 +69,10 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         return f"nothing is left that can be removed: {rate(left)}{but}"
     if helps := helping(certificate):
         first = next(claim for claim in removals if claim.without == helps[0])
-        return f"minimal but for {first_of(helps, MOST_NAMES)}: {kept(certificate)}; without {helps[0]} {rate(first)}{but}"
+        return (
+            f"minimal but for {first_of(helps, MOST_NAMES)}: {kept(certificate)}; without "
+            f"{helps[0]} {rate(first)}{but}"
+        )
     most = max(removals, key=lambda claim: claim.high)
     one = f"{'other ' if pinned else ''}{each}"
     without = f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without
@@ -80,8 +88,10 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
 def _elsewhere(ends: EndsElsewhere) -> str:
     """That what is left mostly ends where f did not, within epsilon of it."""
     return (
-        f"what is left may show another failure within epsilon: of the runs of the whole world with f "
-        f"{ends.whole} of {ends.of_whole} ended in one place, of what is left {ends.left} of {ends.of_left} did, "
+        "what is left may show another failure within epsilon: of the runs of the whole world "
+        "with f "
+        f"{ends.whole} of {ends.of_whole} ended in one place, of what is left {ends.left} of "
+        f"{ends.of_left} did, "
         f"and others ended {ends.apart:.2g} m away; --epsilon {ends.epsilon:g} tells them apart"
     )
 
@@ -105,18 +115,25 @@ def _seldom(removals: Sequence[Claim]) -> str:
     each = " each" if len(removals) > 1 else ""
     if most.shown:
         return f"f in {'at most ' if each else ''}{most.shown} of {count(most.runs, 'fresh run')}"
-    return f"f in none of {count(most.runs, 'fresh run')}{each if len({claim.runs for claim in removals}) == 1 else ''}"
+    if len({claim.runs for claim in removals}) > 1:
+        each = ""
+    return f"f in none of {count(most.runs, 'fresh run')}{each}"
 
 
 def _exactly(certificate: Certificate) -> str:
-    """What the chosen runs show: "f shows with seed 3 each time; without any one of these 4 models it does not"."""
+    """What the chosen runs show: "f shows with seed 3 each time; without any one of these 4 models
+    it does not".
+    """
     _, *removals = certificate.claims
     shows = f"f shows with {seeds_of(certificate)} each time"
     if not removals:
         return f"{shows}; nothing is left that can be removed"
     names = f"any one of these {len(removals)} models" if len(removals) > 1 else removals[0].without
     runs = removals[0].runs
-    return f"{shows}; without {names} it {f'shows with none of the {runs} chosen seeds' if runs > 1 else 'does not'}"
+    return (
+        f"{shows}; without {names} it "
+        f"{f'shows with none of the {runs} chosen seeds' if runs > 1 else 'does not'}"
+    )
 
 
 def seeds_of(certificate: Certificate) -> str:
@@ -125,18 +142,27 @@ def seeds_of(certificate: Certificate) -> str:
 
 
 def kept(certificate: Certificate) -> str:
-    """What is left keeps: "f in 16 of 16 fresh runs (80 % to 100 %), at least 68 % of the whole world's rate"."""
-    return f"{rate(certificate.claims[0])}, at least {percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}"
+    """What is left keeps: "f in 16 of 16 fresh runs (80 % to 100 %), at least 68 % of the whole
+    world's rate".
+    """
+    return (
+        f"{rate(certificate.claims[0])}, at least {percent_at_least(_kept(certificate))} of "
+        f"{_whole_rate(certificate)}"
+    )
 
 
 def _kept(certificate: Certificate) -> float:
-    """The share that "kept" has shown. Certificates of older versions had no bound beyond what they asked for."""
+    """The share that "kept" has shown. Certificates of older versions had no bound beyond what they
+    asked for.
+    """
     bound = certificate.claims[0].bound
     return certificate.certify_rate if bound is None else bound
 
 
 def _at_most(certificate: Certificate) -> float | None:
-    """How often f shows with any one model removed, at most, as a share of its rate with it; None if that was not bounded."""
+    """How often f shows with any one model removed, at most, as a share of its rate with it; None
+    if that was not bounded.
+    """
     bounds = [claim.bound for claim in certificate.claims if claim.without is not None]
     return (
         max((bound for bound in bounds if bound is not None), default=None)
@@ -150,7 +176,9 @@ def _as_often(bound: float | None) -> str:
 
 
 def shown(state: RunState) -> str:
-    """What fresh runs show of what is left, by a finished certificate or so far; one sentence without a full stop."""
+    """What fresh runs show of what is left, by a finished certificate or so far; one sentence
+    without a full stop.
+    """
     if (found := current(state)) is not None:
         return verdict_on(found, never_left_out(state, found))
     said = [missing(state)]
@@ -172,7 +200,9 @@ def shown(state: RunState) -> str:
 
 
 def uncertified(state: RunState, run: object) -> str:
-    """Why what needs a finished certificate cannot be had of a run, and the command that makes one."""
+    """Why what needs a finished certificate cannot be had of a run, and the command that makes
+    one.
+    """
     command = "certify" if state.status == "finished" else "resume"
     return f"{run}: {shown(state)}; make a certificate first: ddenv {command} {run}"
 
@@ -197,7 +227,9 @@ def what_ran(one: FreshRuns) -> str:
 
 
 def rate(fresh: Claim | FreshRuns) -> str:
-    """How often fresh runs showed f: "f in 23 of 23 fresh runs (86 % to 100 %)"; without an interval, how often chosen ones did."""
+    """How often fresh runs showed f: "f in 23 of 23 fresh runs (86 % to 100 %)"; without an
+    interval, how often chosen ones did.
+    """
     return f"f in {_share(fresh.shown, fresh)}"
 
 
@@ -209,10 +241,15 @@ def _share(number: int, one: Claim | FreshRuns | Returned) -> str:
 
 
 def for_everyone(certificate: Certificate) -> str:
-    """What a finished certificate shows, for readers who know no statistics; one sentence without a full stop."""
+    """What a finished certificate shows, for readers who know no statistics; one sentence without a
+    full stop.
+    """
     left, *removals = certificate.claims
     share = f"{percent(left.low)} to {percent(left.high)} of all runs, with 95 % confidence"
-    said = f"It failed like this in {left.shown} of {count(left.runs, 'new run')} with nothing else there ({share})"
+    said = (
+        f"It failed like this in {left.shown} of {count(left.runs, 'new run')} with nothing else "
+        f"there ({share})"
+    )
     if not is_minimal(certificate):
         return f"{said}, but not every part of this result has been shown"
     if not removals:
@@ -222,13 +259,17 @@ def for_everyone(certificate: Certificate) -> str:
     if certificate.seeds:
         return f"{said}; none of the {most.runs} chosen runs failed like this without {one}"
     seldom = f"at most {most.shown}" if most.shown else "none"
-    return f"{said}; with {one} removed, in {seldom} of {most.runs} (at most {percent_at_most(most.high)})"
+    return (
+        f"{said}; with {one} removed, in {seldom} of {most.runs} (at most "
+        f"{percent_at_most(most.high)})"
+    )
 
 
 def in_another_simulator(name: str, fails: bool | None, there: Claim, here: Claim) -> str:
     """What runs `there`, in another simulator, show of what is left; without a full stop.
 
-    The certificate says `here` of what is left. `fails` is what `rates.shows_at` says of the runs at the low end of its interval.
+    The certificate says `here` of what is left. `fails` is what `rates.shows_at` says of the runs
+    at the low end of its interval.
     """
     verdicts = {
         True: f"fails in {name}, too",
@@ -239,14 +280,19 @@ def in_another_simulator(name: str, fails: bool | None, there: Claim, here: Clai
 
 
 def without_in_another_simulator(name: str, verdict: str, there: Claim) -> str:
-    """What runs without a model show in another simulator, beside those of what is left there; without a full stop."""
+    """What runs without a model show in another simulator, beside those of what is left there;
+    without a full stop.
+    """
     verdicts = {
         "needed": f"needed in {name}, too",
         "helps": f"helps in {name}",
         "rarer": f"rarer without it in {name}, too, but by how much is not shown",
         "not needed": f"seems not needed in {name}",
     }
-    return f"{there.without}: {verdicts.get(verdict, f'not shown for {name}')}: without it {_there(there)}"
+    return (
+        f"{there.without}: {verdicts.get(verdict, f'not shown for {name}')}: without it "
+        f"{_there(there)}"
+    )
 
 
 def _there(there: Claim) -> str:
@@ -258,7 +304,8 @@ def _there(there: Claim) -> str:
 def still_fails(fails: bool | None, certificate: Certificate) -> str:
     """What new runs of what is left show.
 
-    `fails` is what `rates.shows_at` says of them at the low end of its interval, or whether it fails with each chosen seed.
+    `fails` is what `rates.shows_at` says of them at the low end of its interval, or whether it
+    fails with each chosen seed.
     """
     if fails is None:
         return "the runs do not decide"
@@ -271,7 +318,9 @@ def still_fails(fails: bool | None, certificate: Certificate) -> str:
 
 
 def means(state: RunState, certificate: Certificate, claim: Claim) -> str:
-    """What the verdict of a claim means, and what happens without a needed model where the robot then fails otherwise."""
+    """What the verdict of a claim means, and what happens without a needed model where the robot
+    then fails otherwise.
+    """
     other = instead(state, certificate, claim)
     return f"{meaning(claim, certificate)}; {other}" if other else meaning(claim, certificate)
 
@@ -281,14 +330,23 @@ def meaning(claim: Claim, certificate: Certificate) -> str:
     rate = _whole_rate(certificate)
     bound = claim.bound
     if claim.without is None and bound is not None and claim.verdict in ("not shown", "unknown"):
-        return f"shown to keep at least {percent_at_least(bound)} of {rate}, not {percent_at_least(certificate.certify_rate)}"
+        return (
+            f"shown to keep at least {percent_at_least(bound)} of {rate}, not "
+            f"{percent_at_least(certificate.certify_rate)}"
+        )
     often = "with none of these seeds" if claim.is_exact else _as_often(bound)
     return {
         "exact": f"f shows with {seeds_of(certificate)} each time",
-        "kept": f"keeps at least {percent_at_least(certificate.certify_rate if bound is None else bound)} of {rate}",
+        "kept": (
+            "keeps at least "
+            f"{percent_at_least(certificate.certify_rate if bound is None else bound)} of {rate}"
+        ),
         "lost": f"keeps less than {percent(certificate.keep_rate)} of {rate}",
         "needed": f"needed: without it f shows {often}",
-        "helps": f"helps: without it f is rarer, but not by much: more than {percent(NEEDED_SHARE)} as often",
+        "helps": (
+            f"helps: without it f is rarer, but not by much: more than {percent(NEEDED_SHARE)} "
+            "as often"
+        ),
         "rarer": f"rarer without it: {'by how much is not shown' if bound == 1.0 else often}",
         "not needed": "seems not needed: without it f showed about as often",
         "not shown": "not shown: the runs are inconclusive",
@@ -308,7 +366,8 @@ def of_passing(state: RunState, one: Isolation) -> str:
             stack_with(state, state.elements, state.elements[model]) for model in one.asked.suspects
         )
         return (
-            "no passing world was found: the robot does not reach its goal often enough even without all "
+            "no passing world was found: the robot does not reach its goal often enough even "
+            "without all "
             f"{count(len(set().union(*stacks)), 'model')} that may be removed"
         )
     check = one.checks[-1]
@@ -319,7 +378,10 @@ def of_passing(state: RunState, one: Isolation) -> str:
         return f"no world is shown to pass: without {names} {_reaching(one, first)}"
     tested = "" if one.asked.chosen else f", tested above {percent(one.asked.rather_than)}"
     without = "it" if len(gone) == 1 else "them"
-    said = f"a nearest world that passes lacks {names}: without {without} {_reaching(one, first)}{tested}"
+    said = (
+        f"a nearest world that passes lacks {names}: without {without} "
+        f"{_reaching(one, first)}{tested}"
+    )
     verdicts = {str(claim.back): claim.verdict for claim in backs}
     if doubt := _doubt(
         verdicts,
@@ -332,7 +394,10 @@ def of_passing(state: RunState, one: Isolation) -> str:
     back = "it" if len(backs) == 1 else f"any one of these {len(backs)}"
     if one.asked.chosen:
         return f"{said}; with {back} put back it misses its goal in a chosen run"
-    return f"{said}; with {back} put back in {'' if len(backs) == 1 else 'at most '}{_share(most.reached, most)}"
+    return (
+        f"{said}; with {back} put back in "
+        f"{'' if len(backs) == 1 else 'at most '}{_share(most.reached, most)}"
+    )
 
 
 def _reaching(one: Isolation, claim: Returned) -> str:
@@ -343,16 +408,21 @@ def _reaching(one: Isolation, claim: Returned) -> str:
 
 
 def of_all_parts(left: Sequence[str], could_go: Sequence[str], smaller: Sequence[str]) -> str:
-    """What is known of an environment that shows f where it is known of every part of the world; without a full stop.
+    """What is known of an environment that shows f where it is known of every part of the world;
+    without a full stop.
 
-    `could_go` are its models without which f still shows; `smaller` is a smaller set that shows f, somewhere in the world.
+    `could_go` are its models without which f still shows; `smaller` is a smaller set that shows f,
+    somewhere in the world.
     """
     if could_go:
         any_one = "any one of " if len(could_go) > 1 else ""
         return f"more can go: f also shows without {any_one}{first_of(could_go, MOST_NAMES)}"
     if not left:
         return "nothing is left that can be removed"
-    known = f"no single one can go: f is gone without {'it' if len(left) == 1 else f'any one of these {len(left)} models'}"
+    known = (
+        "no single one can go: f is gone without "
+        f"{'it' if len(left) == 1 else f'any one of these {len(left)} models'}"
+    )
     if smaller:
         return f"{known}; but not the smallest: {', '.join(smaller)} show f, too"
     return f"{known}. No smaller set shows f either; only checking all sets can tell"
@@ -370,7 +440,9 @@ def made_of_usual(state: RunState, now: Certificate) -> str:
 
 
 def instead(state: RunState, certificate: Certificate, claim: Claim) -> str:
-    """What mostly happens without a needed model if it is another failure: "the robot got stuck 0.5 m from f's end in 7 of 10"."""
+    """What mostly happens without a needed model if it is another failure: "the robot got stuck 0.5
+    m from f's end in 7 of 10".
+    """
     end = failing_instead(state, certificate, claim)
     if end is None:
         return ""
@@ -386,23 +458,31 @@ def short(claim: Claim) -> str:
 def terms(certificate: Certificate, pinned: int = 0) -> str:
     """What a certificate asks for, in one sentence without a full stop."""
     if certificate.seeds:
-        return f"they measure how often what is left shows f with seeds other than {seeds_of(certificate)}"
+        return (
+            "they measure how often what is left shows f with seeds other than "
+            f"{seeds_of(certificate)}"
+        )
     aim = f"{percent_at_least(certificate.certify_rate)} of {_whole_rate(certificate)}"
-    return f"they have to show that what is left keeps {aim}, and that removing {_any_one(pinned)} makes f rarer"
+    return (
+        f"they have to show that what is left keeps {aim}, and that removing {_any_one(pinned)} "
+        "makes f rarer"
+    )
 
 
 def promise(state: RunState, certificate: Certificate) -> str:
     """What "minimal" means by a certificate of a run, in one sentence without a full stop."""
     if certificate.seeds:
         return (
-            "minimal means: for the chosen seeds this is exact, since a seed repeats its run exactly; for other seeds, fresh "
+            "minimal means: for the chosen seeds this is exact, since a seed repeats its run "
+            "exactly; for other seeds, fresh "
             "runs measure how often f shows, and nothing more"
         )
     kept = f"{percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}"
     pinned = never_left_out(state, certificate)
     often = _as_often(_at_most(certificate))
     return (
-        f"minimal means: what is left keeps at least {kept}; with {_any_one(pinned)} removed, f shows {often}; "
+        f"minimal means: what is left keeps at least {kept}; with {_any_one(pinned)} removed, f "
+        f"shows {often}; "
         f"the chance that this is wrong is at most {math.ceil(1000 * certificate.error) / 10:g} %"
     )
 
@@ -412,13 +492,17 @@ def _any_one(pinned: int) -> str:
 
 
 def ended(state: RunState) -> str:
-    """Why a finished run ended, without a full stop; it says so where no fresh runs show what the result is worth."""
+    """Why a finished run ended, without a full stop; it says so where no fresh runs show what the
+    result is worth.
+    """
     said = (state.reason, "" if state.baseline is None else missing(state), smaller_known(state))
     return "; ".join(words for words in said if words)
 
 
 def smaller_known(state: RunState) -> str:
-    """That a smaller environment is known to show f, which the search may not take, and where it is; "" if there is none."""
+    """That a smaller environment is known to show f, which the search may not take, and where it
+    is; "" if there is none.
+    """
     left = len(state.environment)
     nodes = [
         (
@@ -457,7 +541,8 @@ def missing(state: RunState) -> str:
 
 
 def drift(state: RunState) -> Sentences:
-    """How often f showed in the current environment and where it was seen first, from all runs; shorter and shorter forms.
+    """How often f showed in the current environment and where it was seen first, from all runs;
+    shorter and shorter forms.
 
     Empty in the whole world, and where a certificate says more.
     """

@@ -1,4 +1,6 @@
-"""What is said of tests that ended early, and how a test that is made again stands beside its record."""
+"""What is said of tests that ended early, and how a test that is made again stands beside its
+record.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,10 @@ from typing import Any
 from ddenv.runfile.state import RunState, Test
 from ddenv.words.signs import metres
 
-WHY = "the controller had stopped, the robot was at rest, and its end was well inside or outside epsilon"
+WHY = (
+    "the controller had stopped, the robot was at rest, and its end was well inside or outside "
+    "epsilon"
+)
 _OFF = "from here on all tests run to their end"
 
 
@@ -24,7 +29,9 @@ def early_among(tests: Iterable[Test]) -> str:
 
 
 def why_off(state: RunState) -> str:
-    """Why no test of a run ends early any more, in one sentence without a full stop; "" where that did not happen."""
+    """Why no test of a run ends early any more, in one sentence without a full stop; "" where that
+    did not happen.
+    """
     ended = state.early_stop_ended
     if ended is None:
         return ""
@@ -32,12 +39,15 @@ def why_off(state: RunState) -> str:
         return (
             f"certificate {ended.certificate} refutes what tests that ended early accepted: {_OFF}"
         )
-    return f"test {ended.test} ended early, and test {ended.by}, the same to its end, has another verdict: {_OFF}"
+    return (
+        f"test {ended.test} ended early, and test {ended.by}, the same to its end, has another "
+        f"verdict: {_OFF}"
+    )
 
 
 def beside_record(test: Test, now: Mapping[str, Any], repeats: bool) -> str:
-    """How a test that was made again, in full, compares with its record; one sentence without a full stop. `repeats`: its
-    trajectory begins with the recorded one, to the last bit.
+    """How a test that was made again, in full, compares with its record; one sentence without a
+    full stop. `repeats`: its trajectory begins with the recorded one, to the last bit.
     """
     then = ", ".join(
         filter(None, (_ending(test.outcome, test.failure, test.distance), ended_early(test)))

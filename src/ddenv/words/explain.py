@@ -1,4 +1,6 @@
-"""What is happening, in words: the current line of the algorithm, and what the run does there and why."""
+"""What is happening, in words: the current line of the algorithm, and what the run does there and
+why.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,8 @@ NAMED = 8
 NAMED_ENDS = 2
 # An end within so many epsilon of f's end may be the same failure to the user.
 NEAR = 3
-# The maximum number of pinned models that a sentence names, and the maximum width of each name in cells.
+# The maximum number of pinned models that a sentence names, and the maximum width of each name in
+# cells.
 PINNED = 2
 LONGEST = 32
 # Decisions that change the environment or the search.
@@ -72,7 +75,9 @@ Happening = tuple[Step | None, Sentences]
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """`line` is the number of the current one of the algorithm's `lines`, None if the run is at none of them."""
+    """`line` is the number of the current one of the algorithm's `lines`, None if the run is at
+    none of them.
+    """
 
     line: int | None
     sentences: Sentences
@@ -100,13 +105,16 @@ def explain(snapshot: Snapshot) -> Explanation:
 
 
 def _warnings(snapshot: Snapshot) -> Sentences:
-    """What the user has to know before anything else, and a try that could become the environment."""
+    """What the user has to know before anything else, and a try that could become the
+    environment.
+    """
     state = snapshot.state
     said = []
     if snapshot.older_engine and snapshot.engine == "alive":
         version = plain(snapshot.older_engine)
         said.append(
-            f"Another version of ddenv works on this run ({version}): it may not know all commands of this version."
+            f"Another version of ddenv works on this run ({version}): it may not know all "
+            "commands of this version."
         )
     if words := refuted_words(state):
         said.append(as_sentence(words))
@@ -125,12 +133,17 @@ def _implied(state: RunState) -> Sentences:
     if last is None or last.implied_by is None or state.ended:
         return ()
     return (
-        f"Test {last.id} is implied by test {last.implied_by}: no model it lacks affected that run.",
+        (
+            f"Test {last.id} is implied by test {last.implied_by}: no model it lacks affected that "
+            "run."
+        ),
     )
 
 
 def _offered(state: RunState) -> Sentences:
-    """Another way for an f that is rare, never differs, or whose ends scatter, until something is left out."""
+    """Another way for an f that is rare, never differs, or whose ends scatter, until something is
+    left out.
+    """
     notes = dict(state.notes)
     offers = [notes[about] for about in ("scatter", "rare", "alike") if about in notes]
     if state.node or state.ended:
@@ -157,7 +170,9 @@ def _by_hand(state: RunState) -> Sentences:
 
 
 def _arrival(state: RunState) -> str:
-    """How the user's last decision led to this environment; "" if there is none, or a test was made since."""
+    """How the user's last decision led to this environment; "" if there is none, or a test was made
+    since.
+    """
     last = state.decisions[-1] if state.decisions else None
     if (
         state.here is None
@@ -197,7 +212,10 @@ def _happening(snapshot: Snapshot) -> Happening:
         after = count(candidate.size, "model")
         return "waiting", (
             f"{candidate.label} shows f: {_ended(state, candidate, options)}",
-            f"The reduction waits for you: a accepts it ({before} → {after}), x rejects it and goes on.",
+            (
+                f"The reduction waits for you: a accepts it ({before} → {after}), x rejects it and "
+                "goes on."
+            ),
         )
     return _with_pause(state, _testing(snapshot, state.round, options))
 
@@ -208,7 +226,10 @@ def _with_pause(state: RunState, happening: Happening) -> Happening:
         free = f"{state.needs_room / 1e6:.0f} MB"
         full = f"The disk is full: no new test starts until {free} are free."
         if state.file_is_full:
-            full = "The run file is as large as a file may be (ulimit -f): no new test starts until that limit is raised."
+            full = (
+                "The run file is as large as a file may be (ulimit -f): no new test starts until "
+                "that limit is raised."
+            )
         return step, (f"{full} Nothing is lost.", *sentences)
     if not state.paused:
         return happening
@@ -249,7 +270,10 @@ def _standing(state: RunState, status: str) -> Sentences:
                 else ""
             )
             return (
-                f"The engine is not running: it was killed, or its machine went down. r resumes.{lost}",
+                (
+                    "The engine is not running: it was killed, or its machine went down. r "
+                    f"resumes.{lost}"
+                ),
             )
     return ()
 
@@ -271,7 +295,10 @@ def _baseline_so_far(state: RunState, options: Settings) -> Sentences:
         "failure that most runs end in: only worlds that show it are kept."
     )
     if any(test.run >= options.baseline_runs for test in state.tests):
-        first = "Few runs of the whole world show f, or they show several failures, so more runs are made."
+        first = (
+            "Few runs of the whole world show f, or they show several failures, so more runs are "
+            "made."
+        )
     # The last one first: that the world is slow.
     said = [*(as_sentence(plain(words)) for _, words in reversed(state.notes)), first]
     if tests:
@@ -291,7 +318,8 @@ def _between(snapshot: Snapshot, options: Settings) -> Sentences:
     first = f"Round {number}: {beginning(options, len(state.environment))}"
     # How the environment was cut down to its slice, until the next test is made.
     if here is not None and here.how == "sliced" and here.tests == state.tests_done:
-        # An earlier moment says itself what the slice left out, and nothing can be taken back there.
+        # An earlier moment says itself what the slice left out, and nothing can be taken back
+        # there.
         free = () if snapshot.past else (f"{plain(slice_words(state, here))}. u takes it back.",)
         return (TEACHING, *free, first)
     if arrived := _arrival(state):
@@ -305,7 +333,10 @@ def _ended(state: RunState, candidate: Candidate, options: Settings) -> str:
     if test is None or not metres(test.distance, 2):
         return "the robot failed as in f."
     did = deed(test.failure) if test.failure in DEEDS else "ended"
-    return f"the robot {did} {metres(test.distance, 2)} from f's end (up to {options.epsilon:g} m is similar)."
+    return (
+        f"the robot {did} {metres(test.distance, 2)} from f's end (up to {options.epsilon:g} m "
+        "is similar)."
+    )
 
 
 def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening:
@@ -340,7 +371,8 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
     place = f"{candidate.label} ({count(candidate.size, 'model')}), {place}"
     if not running:
         return "next", (*_last_reduction(state), _next(state, candidate, place, options))
-    # Speculation may run several tests of one candidate at once; the earliest is the one the algorithm is at.
+    # Speculation may run several tests of one candidate at once; the earliest is the one the
+    # algorithm is at.
     test = running[0]
     # Its run number differs where chosen runs are repeated.
     number = candidate.tests.index(test.id) if test.id in candidate.tests else test.run
@@ -388,22 +420,34 @@ def _of_run(
     if not number:
         return (
             f"First run of {place}.",
-            f"It shows f if the goal is not reached in {options.timeout:g} s and the robot ends within "
+            f"It shows f if the goal is not reached in {options.timeout:g} s and the robot ends "
+            "within "
             f"{options.epsilon:g} m of f's end.",
         )
     if shown := _shown_of(state, candidate):
         return (
             f"Run {number + 1} of {place}: {shown}.",
-            "It is accepted once its runs show that it keeps the rate of f, and dropped once that is unlikely.",
+            (
+                "It is accepted once its runs show that it keeps the rate of f, and dropped once "
+                "that is unlikely."
+            ),
         )
     return (
-        f"Re-run {number} of {options.most_runs - 1} of {place}: {_why_again(_last(state, candidate))}",
-        f"A failure can be flaky: a candidate is dissimilar after at most {count(options.most_runs, 'test')} without f.",
+        (
+            f"Re-run {number} of {options.most_runs - 1} of {place}: "
+            f"{_why_again(_last(state, candidate))}"
+        ),
+        (
+            "A failure can be flaky: a candidate is dissimilar after at most "
+            f"{count(options.most_runs, 'test')} without f."
+        ),
     )
 
 
 def _shown_of(state: RunState, candidate: Candidate) -> str:
-    """How often f showed in a candidate that has no verdict yet although f showed in it; "" if it did not."""
+    """How often f showed in a candidate that has no verdict yet although f showed in it; "" if it
+    did not.
+    """
     _, shown = seen(state.tests, candidate.tests)
     done = sum(test.is_finished for test in state.tests_of(candidate.tests))
     return f"f showed in {of_runs(shown, done)} so far" if shown else ""
@@ -447,7 +491,10 @@ def _finished(state: RunState) -> Happening:
             left,
         )
     if not state.environment:
-        none = "f shows without any removable model: look at the robot, its goal and the models that always stay."
+        none = (
+            "f shows without any removable model: look at the robot, its goal and the models "
+            "that always stay."
+        )
         return "returned", ("Minimal: no model left.", _reason(state, ""), none, base)
     stays = ("p unpins.",) if state.pinned.intersection(state.environment) else ()
     certificate = current(state)
@@ -469,7 +516,9 @@ def _finished(state: RunState) -> Happening:
 
 
 def _instead_of_f(state: RunState) -> Sentences:
-    """What the robot does without models that f needs, where it mostly fails in another way; and what can be done about it."""
+    """What the robot does without models that f needs, where it mostly fails in another way; and
+    what can be done about it.
+    """
     if (certificate := current(state)) is None:
         return ()
     ends = {
@@ -513,19 +562,26 @@ def _last(state: RunState, candidate: Candidate, outcome: str | None = None) -> 
     )
 
 
-# While fresh runs show what the result of the rounds is worth, or find the nearest world that passes.
+# While fresh runs show what the result of the rounds is worth, or find the nearest world that
+# passes.
 
 
 def _certifying(snapshot: Snapshot) -> Sentences:
     state = snapshot.state
     if state.isolating is not None:
         return (
-            "Isolation: removing as few models as possible from the whole world so that the robot reaches its goal.",
+            (
+                "Isolation: removing as few models as possible from the whole world so that the "
+                "robot reaches its goal."
+            ),
             f"Now {plain(isolating(state))}. The result of the reduction does not change.",
         )
     if state.margining is not None:
         return (
-            "Margins: each number is changed in turn, to see how far it can go before f disappears.",
+            (
+                "Margins: each number is changed in turn, to see how far it can go before f "
+                "disappears."
+            ),
             f"Now {plain(finding(state))}. The result of the reduction does not change.",
         )
     certificate = state.certificate
@@ -534,7 +590,10 @@ def _certifying(snapshot: Snapshot) -> Sentences:
     if certificate.claims:
         over = "The certificate is finished."
         if certificate.claims[0].verdict == "lost":
-            over = "What is left keeps too little of the rate. Earlier ones are run to find the last one not shown to have lost it."
+            over = (
+                "What is left keeps too little of the rate. Earlier ones are run to find the "
+                "last one not shown to have lost it."
+            )
         return (over, *_now(snapshot, certificate))
     made = fresh_runs_made(state, certificate)
     done = f"{made} {'is' if made == 1 else 'are'} done"
@@ -544,7 +603,10 @@ def _certifying(snapshot: Snapshot) -> Sentences:
     kept = f"at least {percent_at_least(shown)} is kept" if shown else "nothing is shown yet"
     return (
         *(() if certificate.seeds else (f"{bar(shown, aim)} {kept}, aim {percent(aim)}",)),
-        f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
+        (
+            "Full runs with fresh seeds check the result: "
+            f"{terms(certificate, len(state.pinned.intersection(state.environment)))}."
+        ),
         f"By the rates seen so far, this takes about {usual_runs(state, certificate)}; {done}.",
         *_so_far(rows),
         *_now(snapshot, certificate),

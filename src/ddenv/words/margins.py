@@ -1,4 +1,6 @@
-"""Margins in words: a table of numbers, a sentence for each, the nearest fix, and how far the search is."""
+"""Margins in words: a table of numbers, a sentence for each, the nearest fix, and how far the
+search is.
+"""
 
 from __future__ import annotations
 
@@ -28,15 +30,19 @@ FINDING = "finding margins"
 HEAD = ("number", "now", "f until", "instead", "runs")
 # What a bar shows. It is drawn over the root of the change, so that small changes are seen.
 BAR_WORDS = (
-    "█ f, + goal, · something else or undecided, x not possible; between two values tried: as at the farther one. "
-    "From the middle outwards: the change as a share of the number's scale, on a square-root axis; half way is 25 %."
+    "█ f, + goal, · something else or undecided, x not possible; between two values tried: as at "
+    "the farther one. "
+    "From the middle outwards: the change as a share of the number's scale, on a square-root "
+    "axis; half way is 25 %."
 )
 _SIGNS = {"f": "█", "goal": "+", "impossible": "x"}
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A number in the table: the cells below `HEAD`, those for lower values first; and a sentence without a full stop."""
+    """A number in the table: the cells below `HEAD`, those for lower values first; and a sentence
+    without a full stop.
+    """
 
     cells: tuple[str, ...]
     sentence: str
@@ -68,7 +74,9 @@ def _end(side: Side) -> str:
 
 
 def _from(side: Side) -> str:
-    """Where the robot reaches its goal, else what happens where f no longer shows; "" if neither is known."""
+    """Where the robot reaches its goal, else what happens where f no longer shows; "" if neither is
+    known.
+    """
     if side.goal is not None:
         to_end = "≥" if side.up else "≤"
         return f"goal {to_end if side.to_end else 'at'} {side.goal.value:.4g}"
@@ -110,7 +118,10 @@ def _said(side: Side) -> str:
 
 
 def _in(value: Value, outcome: str) -> str:
-    return f"{value.value:.4g} ({value.outcomes.count(outcome)} of {count(len(value.outcomes), 'run')})"
+    return (
+        f"{value.value:.4g} ({value.outcomes.count(outcome)} of "
+        f"{count(len(value.outcomes), 'run')})"
+    )
 
 
 def _instead(value: Value) -> str:
@@ -125,7 +136,9 @@ def _instead(value: Value) -> str:
 
 
 def nearest_fix(margins: Margins) -> str:
-    """The smallest change with which the robot reaches its goal, as a sentence; "" while there is none."""
+    """The smallest change with which the robot reaches its goal, as a sentence; "" while there is
+    none.
+    """
     judged = [one for one in fixes_of(margins) if one.confirmed is not None]
     if not judged:
         return ""
@@ -157,7 +170,8 @@ def sureness(margins: Margins) -> str:
         else " No certificate has shown yet how often f shows in what is left."
     )
     return (
-        "Claims hold for the values tried, not for those in between; the chance that any claim of a call is wrong is at most "
+        "Claims hold for the values tried, not for those in between; the chance that any claim "
+        "of a call is wrong is at most "
         f"{percent(ERROR)}.{less}"
     )
 
@@ -180,7 +194,9 @@ def lines(margins: Margins) -> Iterator[str]:
 
 
 def bar(one: Margin, width: int) -> str:
-    """A line of so many cells around the present value, up to the farthest one that was tried on each side."""
+    """A line of so many cells around the present value, up to the farthest one that was tried on
+    each side.
+    """
     cells = []
     for place in range(width):
         at = 2.0 * place / (width - 1) - 1.0
@@ -199,7 +215,9 @@ def bar(one: Margin, width: int) -> str:
 
 
 def finding(state: RunState) -> str:
-    """How far the search for margins is: its number, its runs, and about how long it takes by the runs so far."""
+    """How far the search for margins is: its number, its runs, and about how long it takes by the
+    runs so far.
+    """
     now = state.margining
     if now is None:
         return FINDING
@@ -242,4 +260,7 @@ def impossible(_: RunState, after: RunState) -> str:
 
 def started(_: RunState, after: RunState) -> str:
     assert after.margins is not None
-    return f"{finding(after)}; how far can each of {count(len(after.margins.wanted), 'number')} change before f disappears?"
+    return (
+        f"{finding(after)}; how far can each of {count(len(after.margins.wanted), 'number')} "
+        "change before f disappears?"
+    )

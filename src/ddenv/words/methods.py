@@ -1,4 +1,6 @@
-"""How a run reduces its world: the algorithm's listing, what it uses of the pair, and the explanations."""
+"""How a run reduces its world: the algorithm's listing, what it uses of the pair, and the
+explanations.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ class Listing:
 
 
 def _listing(*lines: tuple[int, str, str]) -> Listing:
-    """From (number, code, steps) of the lines after the first one, which is at work before any algorithm begins."""
+    """From (number, code, steps) of the lines after the first one, which is at work before any
+    algorithm begins.
+    """
     lines = ((0, "f ← failure of R(E, goal, timeout), several runs", "baseline"), *lines)
     steps = {step: number for number, _, steps in lines for step in steps.split()}
     return Listing(tuple((number, code) for number, code, _ in lines), steps)
@@ -132,7 +136,9 @@ def chosen(algorithm: str, pair: str) -> dict[Kind, str]:
 
 
 def labels(algorithm: str, pair: str) -> tuple[str, ...]:
-    """The method in short, without what the algorithm does not use, from the longest form to the shortest."""
+    """The method in short, without what the algorithm does not use, from the longest form to the
+    shortest.
+    """
     if algorithm == "ddenv":
         return (pair,)
     used = uses(algorithm)
@@ -170,19 +176,26 @@ def beginning(options: Settings, models: int) -> str:
     names = chosen(options.algorithm, options.pair)
     match options.algorithm:
         case "ddenv":
-            return f"{kept} are split by {names['partitioning']}, then ordered by {names['prioritization']}."
+            return (
+                f"{kept} are split by {names['partitioning']}, then ordered by "
+                f"{names['prioritization']}."
+            )
         case "ddmin":
             return f"{kept} are cut into parts of equal size, in the order of the world file."
         case "probdd":
             return f"of {kept}, the group with the greatest expected gain is left out."
         case "splitting":
-            return f"of {kept}, the farthest undecided ones are left out; {names['prioritization']} defines how far."
+            return (
+                f"of {kept}, the farthest undecided ones are left out; {names['prioritization']} "
+                "defines how far."
+            )
     return f"{plain(options.algorithm)} chooses candidates from {kept}."
 
 
 def follows(options: Settings, last: Round) -> str:
     """What the last round means for the next one, or ""."""
-    # The user may have changed something in the middle of the round, perhaps while a reduction waited.
+    # The user may have changed something in the middle of the round, perhaps while a reduction
+    # waited.
     if last.winner is not None or any(one.verdict in ("", "similar") for one in last.candidates):
         return ""
     reason = "No candidate showed f in the last round"
@@ -209,5 +222,7 @@ SMALLER = {
     "ddenv": "the next round splits E into smaller parts",
     "ddmin": "n doubles, and the parts get smaller",
     "probdd": "each model left out is now more likely to be needed",
-    "splitting": "at least one of the models left out is needed; of several, half are left out next",
+    "splitting": (
+        "at least one of the models left out is needed; of several, half are left out next"
+    ),
 }

@@ -37,7 +37,9 @@ HINTS = {
 
 
 def headline(state: RunState, simulated: float | None = None) -> str:
-    """The state in one line, cut to the terminal's width. The running test that is farthest has `simulated` so much time, s."""
+    """The state in one line, cut to the terminal's width. The running test that is farthest has
+    `simulated` so much time, s.
+    """
     models = f"{len(state.environment)} of {len(state.elements)} models"
     running = state.tally["running"]
     status = "waiting for disk space" if state.needs_room and not state.ended else state.status
@@ -84,7 +86,9 @@ def isolating(state: RunState) -> str:
 
 
 def news(kind: str, before: RunState, after: RunState, attached: bool = False) -> str:
-    """What one event changed, or "" if it is not worth a line; with a hint how to attach unless the reader is `attached`."""
+    """What one event changed, or "" if it is not worth a line; with a hint how to attach unless the
+    reader is `attached`.
+    """
     if kind in NEWS:
         line = NEWS[kind](before, after)
     else:
@@ -107,7 +111,10 @@ def _engine_started(before: RunState, after: RunState) -> str:
 def _comparing(_: RunState, after: RunState) -> str:
     if after.physics.now == after.physics.proven:
         return "a run is made again with its seed, to see whether it repeats exactly"
-    return f"made with {after.physics.proven}, now {after.physics.now}: the first run is repeated and compared"
+    return (
+        f"made with {after.physics.proven}, now {after.physics.now}: the first run is repeated "
+        "and compared"
+    )
 
 
 def _compared(before: RunState, after: RunState) -> str:
@@ -118,7 +125,10 @@ def _compared(before: RunState, after: RunState) -> str:
 def _disk_space(before: RunState, after: RunState) -> str:
     if after.needs_room:
         if after.file_is_full:
-            return "  the run file is as large as a file may be (ulimit -f): waiting until that limit is raised"
+            return (
+                "  the run file is as large as a file may be (ulimit -f): waiting until that "
+                "limit is raised"
+            )
         return f"  out of disk space: waiting until {after.needs_room / 1e6:.0f} MB are free"
     return "  there is disk space again" if before.needs_room else ""
 
@@ -150,11 +160,16 @@ def _candidate_judged(before: RunState, after: RunState) -> str:
 
 
 def _judged(state: RunState, judged: Iterable[Candidate | Trial | Removal]) -> str:
-    """Verdicts, and how the tests ended: "part A (3 models): dissimilar after 4 tests (2 pass, 2 stuck), implied by test 3"."""
+    """Verdicts, and how the tests ended: "part A (3 models): dissimilar after 4 tests (2 pass, 2
+    stuck), implied by test 3".
+    """
     said = []
     for one in judged:
         if isinstance(one, Removal):
-            what = f"the whole world without {count(len(one.models), 'model')} ({first_of(one.models, MOST_NAMES)})"
+            what = (
+                f"the whole world without {count(len(one.models), 'model')} "
+                f"({first_of(one.models, MOST_NAMES)})"
+            )
         else:
             what = f"{one.label} ({count(one.size, 'model')})"
         endings = Counter(
@@ -174,20 +189,28 @@ def _judged(state: RunState, judged: Iterable[Candidate | Trial | Removal]) -> s
 
 
 def _ending(state: RunState, test: Test) -> str:
-    """How a test ended: "stuck"; "stuck elsewhere" if f is to get stuck, but this is another failure."""
+    """How a test ended: "stuck"; "stuck elsewhere" if f is to get stuck, but this is another
+    failure.
+    """
     if test.failure not in DEEDS:
         return test.outcome
     seen = () if state.baseline is None else state.baseline.seen
     f = {kind for one in seen if one.test in state.failures for kind in one.kinds}
     if test.outcome != "other" or test.failure not in f:
         return test.failure
-    return f"{test.failure} {'elsewhere' if settings(state).similarity == 'end-pose' else 'differently'}"
+    return (
+        f"{test.failure} "
+        f"{'elsewhere' if settings(state).similarity == 'end-pose' else 'differently'}"
+    )
 
 
 def _waiting(_: RunState, after: RunState) -> str:
     if after.round is None or after.waiting_candidate is None:
         return ""
-    return f"  {after.round.candidates[after.waiting_candidate].label} shows f and waits for accept or reject"
+    return (
+        f"  {after.round.candidates[after.waiting_candidate].label} shows f and waits for accept "
+        "or reject"
+    )
 
 
 def _left(state: RunState) -> str:
@@ -200,7 +223,10 @@ def _certificate_started(_: RunState, after: RunState) -> str:
         f"fresh runs of what is left ({_left(after)}), without each model, and of the whole world"
     )
     if last.seeds:
-        what = f"the chosen seeds check what is left ({_left(after)}); fresh runs measure how often others show f"
+        what = (
+            f"the chosen seeds check what is left ({_left(after)}); fresh runs measure how often "
+            "others show f"
+        )
     return f"certificate {last.number}: {what}; about {usual_runs(after, last)}"
 
 
@@ -244,10 +270,12 @@ NEWS: dict[str, Callable[[RunState, RunState], str]] = {
         f"  back to {_left(after)}, the last environment not shown to have lost the rate"
     ),
     "left_out": lambda _, after: (
-        f"  reduced to {_left(after)} after {after.tests_done} tests: {after.nodes[after.node].what} f seems to show about as often"
+        f"  reduced to {_left(after)} after {after.tests_done} tests: "
+        f"{after.nodes[after.node].what} f seems to show about as often"
     ),
     "isolation_started": lambda *_: (
-        f"{ISOLATING}: removing as few models as possible from the whole world so that the robot reaches its goal"
+        f"{ISOLATING}: removing as few models as possible from the whole world so that the robot "
+        "reaches its goal"
     ),
     "removal_judged": lambda before, after: _judged(
         after, after.removals.changed_since(before.removals)

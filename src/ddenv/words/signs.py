@@ -1,4 +1,6 @@
-"""Signs and short words: for how a run stands, how a test ended, and the verdicts of candidates and claims."""
+"""Signs and short words: for how a run stands, how a test ended, and the verdicts of candidates and
+claims.
+"""
 
 from __future__ import annotations
 
@@ -104,7 +106,9 @@ def brief(seconds: float) -> str:
 
 
 def simulated(seconds: float | None, timeout: float) -> str:
-    """How far a running test is, in simulated time, marked so that it is not taken for real time."""
+    """How far a running test is, in simulated time, marked so that it is not taken for real
+    time.
+    """
     return "" if seconds is None else f" {seconds:.1f}/{timeout:g} s"
 
 

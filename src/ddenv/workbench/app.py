@@ -35,7 +35,9 @@ LOOPS = 8
 
 
 def classes_at(screen: type[Screen[Any]], size: Size) -> str:
-    """The classes of its breakpoints. A screen that begins with them opens 0.1 s sooner: it computes styles once."""
+    """The classes of its breakpoints. A screen that begins with them opens 0.1 s sooner: it
+    computes styles once.
+    """
     sides = (
         (screen.HORIZONTAL_BREAKPOINTS or (), size.width),
         (screen.VERTICAL_BREAKPOINTS or (), size.height),
@@ -46,9 +48,11 @@ def classes_at(screen: type[Screen[Any]], size: Size) -> str:
 
 
 def attention(title: str, words: str, environment: Mapping[str, str]) -> str:
-    """The characters to send. Terminals ignore what they do not know, and some know both kinds: only one is sent.
+    """The characters to send. Terminals ignore what they do not know, and some know both kinds:
+    only one is sent.
 
-    OSC 777 is for VTE (GNOME Terminal and others) and rxvt, OSC 9 for the others: iTerm2, WezTerm, kitty, Ghostty, foot, Windows.
+    OSC 777 is for VTE (GNOME Terminal and others) and rxvt, OSC 9 for the others: iTerm2, WezTerm,
+    kitty, Ghostty, foot, Windows.
     """
     title = plain(title).replace(";", ",")
     words = plain(words).replace(";", ",")
@@ -59,7 +63,8 @@ def attention(title: str, words: str, environment: Mapping[str, str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """The user's own settings: `theme` is "" if the terminal decides, `keys` are Textual's names of keys by action ids.
+    """The user's own settings: `theme` is "" if the terminal decides, `keys` are Textual's names of
+    keys by action ids.
 
     `notify`: the terminal rings and shows a notification when a run needs a look.
     """
@@ -76,10 +81,12 @@ def _commands() -> type[Provider]:
 
 
 class Workbench(App[int]):
-    """Starts at the setup screen, or attached to a run. Raises UserError for a file that is not a run.
+    """Starts at the setup screen, or attached to a run. Raises UserError for a file that is not a
+    run.
 
-    `reading` holds the command line's options on how to read worlds, `file` is a scenario or world to start
-    with. With `watch` the run is only watched, never guided. `first` makes another screen to start at, and may raise UserError.
+    `reading` holds the command line's options on how to read worlds, `file` is a scenario or world
+    to start with. With `watch` the run is only watched, never guided. `first` makes another screen
+    to start at, and may raise UserError.
     """
 
     TITLE = "ddenv"
@@ -156,8 +163,8 @@ class Workbench(App[int]):
         return variables
 
     async def on_event(self, event: events.Event) -> None:
-        """As every app, but a key ends the notice that is shown, and tab moves the focus before the next key is looked at: that
-        would still go to the field before.
+        """As every app, but a key ends the notice that is shown, and tab moves the focus before the
+        next key is looked at: that would still go to the field before.
         """
         if isinstance(event, events.Key) and not event.is_forwarded:
             self.clear_notifications()
@@ -201,7 +208,9 @@ class Workbench(App[int]):
             self.screen.call_after_refresh(gc.enable)
 
     def notify(self, message: str, **options: Any) -> None:
-        """As every app, but at most one notice is shown, and none over a dialog: it waits until that is closed."""
+        """As every app, but at most one notice is shown, and none over a dialog: it waits until
+        that is closed.
+        """
         self._held = message, options
         self._show_held()
 

@@ -1,4 +1,6 @@
-"""The user's own theme, keys and notifications, from a file; all actions that have keys; the lines of `ddenv config`."""
+"""The user's own theme, keys and notifications, from a file; all actions that have keys; the lines
+of `ddenv config`.
+"""
 
 from __future__ import annotations
 
@@ -57,13 +59,16 @@ def actions() -> dict[str, Action]:
 
 
 def checked(wanted: Mapping[str, str], where: str) -> dict[str, str]:
-    """Textual's keymap with these keys for the actions. Raises UserError with a message that begins with `where`."""
+    """Textual's keymap with these keys for the actions. Raises UserError with a message that begins
+    with `where`.
+    """
     keymap = {id: textual_keys(keys, f"{where}: keys: {id}") for id, keys in wanted.items()}
     known = actions()
     for id in keymap:
         if id not in known:
             raise UserError(
-                f"{where}: keys: there is no action '{id}'{nearest(id, known)}; 'ddenv config' lists them"
+                f"{where}: keys: there is no action '{id}'{nearest(id, known)}; 'ddenv config' "
+                "lists them"
             )
     for owner in _owners():
         _check_clashes(owner, keymap, where)
@@ -144,7 +149,8 @@ def read_config() -> Config:
     data = read_yaml(path) or {}
     if not isinstance(data, dict):
         raise UserError(
-            f"{path}: expected lines such as 'theme: {DARK.name}'; 'ddenv config --example' prints some"
+            f"{path}: expected lines such as 'theme: {DARK.name}'; 'ddenv config --example' "
+            "prints some"
         )
     try:
         found = File.model_validate(data)
@@ -156,11 +162,14 @@ def read_config() -> Config:
 
 
 def lines() -> list[str]:
-    """The file, the theme, whether the terminal rings, and every action with its keys. Raises UserError for an invalid file."""
+    """The file, the theme, whether the terminal rings, and every action with its keys. Raises
+    UserError for an invalid file.
+    """
     config = read_config()
     path = config_path()
+    note = "" if path.exists() else " (does not exist; ddenv config --example prints one)"
     found = [
-        f"file    {path}{'' if path.exists() else ' (does not exist; ddenv config --example prints one)'}",
+        f"file    {path}{note}",
         f"theme   {config.theme or f'{DARK.name}, or ansi-dark where the terminal has 16 colours'}",
         f"themes  {', '.join(theme_names())}",
         f"notify  {'yes' if config.notify else 'no'}",

@@ -1,4 +1,6 @@
-"""The dialog that exports a run: what is left as a world and a scenario, a report, a bundle, messages, a test."""
+"""The dialog that exports a run: what is left as a world and a scenario, a report, a bundle,
+messages, a test.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,8 @@ from ddenv.workbench.shared.bindings import HELP, keys
 from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.world.access import WORLD_ENDINGS, ending_of, is_directives, without_tilde
 
-# What can be written: its id, its label, how the suggested name ends, and the endings that a name may have.
+# What can be written: its id, its label, how the suggested name ends, and the endings that a name
+# may have.
 KINDS = (
     ("world", "world (SDF)", ".minimal", WORLD_ENDINGS),
     ("scenario", "scenario (YAML)", ".minimal.yaml", (".yaml", ".yml")),
@@ -46,7 +49,8 @@ MEANINGS = {
     "test": "A test that fails as long as the robot does, with the run beside it.",
 }
 WRITING = "writing ... escape stops it"
-# Maximum number of existing files to name, of files that a world needs to name, and of characters of each of those.
+# Maximum number of existing files to name, of files that a world needs to name, and of characters
+# of each of those.
 MOST_NAMED = 3
 MOST_NEEDS = 3
 LONGEST_NEED = 60
@@ -55,7 +59,9 @@ Wanted = Mapping[str, Path]
 
 
 class Tick(Checkbox):
-    """A checkbox that is empty when it is off, so that nothing depends on colour alone. Only space ticks it: enter writes."""
+    """A checkbox that is empty when it is off, so that nothing depends on colour alone. Only space
+    ticks it: enter writes.
+    """
 
     BINDINGS: ClassVar = [Binding("enter", "screen.write", show=False)]
 
@@ -244,7 +250,9 @@ def files_of(wanted: Wanted) -> Iterator[Path]:
 
 
 def write(run: Path, wanted: Wanted, stopped: Callable[[], bool]) -> Iterator[str]:
-    """Writes the files; yields a line for each. Raises UserError for the first that cannot be written, and once it is `stopped`."""
+    """Writes the files; yields a line for each. Raises UserError for the first that cannot be
+    written, and once it is `stopped`.
+    """
     from ddenv.report.bundle import write_bundle, write_test
     from ddenv.report.report import write_report
     from ddenv.runs.export import export_world

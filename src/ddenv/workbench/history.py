@@ -1,4 +1,6 @@
-"""The history of a run: the tree of its reductions, the user's decisions, and two environments side by side."""
+"""The history of a run: the tree of its reductions, the user's decisions, and two environments side
+by side.
+"""
 
 from __future__ import annotations
 

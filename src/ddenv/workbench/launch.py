@@ -26,8 +26,11 @@ def run_workbench(
     file: Path | None = None,
     first: Callable[[], Screen[Any]] | None = None,
 ) -> int:
-    """Runs the workbench until the user quits; returns the exit code. Raises UserError without a run file or a terminal."""
-    # With the usual ones the slowest keys take twice as long. There is no garbage yet: the app begins to look for it.
+    """Runs the workbench until the user quits; returns the exit code. Raises UserError without a
+    run file or a terminal.
+    """
+    # With the usual ones the slowest keys take twice as long. There is no garbage yet: the app
+    # begins to look for it.
     gc.set_threshold(20_000, 20, 20)
     gc.disable()
     from ddenv.workbench.app import Workbench
@@ -59,15 +62,18 @@ def check_terminal() -> None:
         os.dup2(sys.__stdout__.fileno(), output.fileno())
     if output is None or sys.__stdin__ is None or not (output.isatty() and sys.__stdin__.isatty()):
         raise UserError(
-            "the workbench needs a terminal; 'ddenv run', 'ddenv resume' and 'ddenv report' work without one"
+            "the workbench needs a terminal; 'ddenv run', 'ddenv resume' and 'ddenv report' work "
+            "without one"
         )
     if os.environ.get("TERM") == "dumb":
         raise UserError(
-            "TERM=dumb: this terminal cannot show a screen; 'ddenv run' and 'ddenv resume' need none"
+            "TERM=dumb: this terminal cannot show a screen; 'ddenv run' and 'ddenv resume' need "
+            "none"
         )
     try:
         SIGNS.encode(output.encoding)
     except (UnicodeEncodeError, LookupError):
         raise UserError(
-            f"this terminal's encoding is {output.encoding}, which cannot draw the screen; type: export LANG=C.UTF-8"
+            f"this terminal's encoding is {output.encoding}, which cannot draw the screen; type: "
+            "export LANG=C.UTF-8"
         ) from None

@@ -1,4 +1,6 @@
-"""`ddenv open RUN --lines`: a line for each thing that happens; what the user types is answered, or done."""
+"""`ddenv open RUN --lines`: a line for each thing that happens; what the user types is answered, or
+done.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,8 @@ from ddenv.workbench.shared.processes import Engine
 NAMED = 50
 # The tries that are listed, the latest ones.
 TRIES = 5
-# By the words that are typed: the action of `ddenv.guiding.offers`, the screen's key for it, and what it does.
+# By the words that are typed: the action of `ddenv.guiding.offers`, the screen's key for it, and
+# what it does.
 GUIDES = {
     "pause": ("pause", "space", "start no new test; again to resume"),
     "step": ("step", "s", "run one test, then pause"),
@@ -120,7 +123,9 @@ QUESTIONS: dict[str, tuple[Callable[[Snapshot], Iterator[str]], str]] = {
 
 
 def meaning(line: str, now: Situation) -> Offer | None:
-    """What a line asks for now; None if it guides nothing. Raises UserError for a row or a model that there is not."""
+    """What a line asks for now; None if it guides nothing. Raises UserError for a row or a model
+    that there is not.
+    """
     first, _, rest = line.strip().partition(" ")
     word = first if first in GUIDES else _KEYS.get(first, "")
     rest = rest.strip()
@@ -147,7 +152,9 @@ def meaning(line: str, now: Situation) -> Offer | None:
 
 
 class LineMode:
-    """Follows a run: says what is new at each turn, and does what was typed meanwhile. Raises UserError for what is no run file."""
+    """Follows a run: says what is new at each turn, and does what was typed meanwhile. Raises
+    UserError for what is no run file.
+    """
 
     def __init__(self, path: Path, watch: bool, out: TextIO) -> None:
         self._out = out
@@ -167,7 +174,8 @@ class LineMode:
         """
         self._look()
         self._say(
-            f"{plain(self._poll.path.stem)}: type help for what you can do; quit leaves, and the engine goes on"
+            f"{plain(self._poll.path.stem)}: type help for what you can do; quit leaves, and the "
+            "engine goes on"
         )
         self._say(*self._news, *status(self._poll.snapshot))
         self._news = deque()
@@ -273,7 +281,9 @@ class LineMode:
 
 
 def typed_lines(typed: TextIO) -> Iterator[str | None]:
-    """Lines as they are typed, "" when there was none for `PERIOD`, and None from the end of the input on."""
+    """Lines as they are typed, "" when there was none for `PERIOD`, and None from the end of the
+    input on.
+    """
     handle = typed.fileno()
     waiting = b""
     while True:

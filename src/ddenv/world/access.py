@@ -28,7 +28,9 @@ def is_world(path: Path) -> bool:
 
 
 def is_read_as_world(path: Path) -> bool:
-    """Whether a file is read as a world, by its name: one that cannot be a world as it is says then how it becomes one."""
+    """Whether a file is read as a world, by its name: one that cannot be a world as it is says then
+    how it becomes one.
+    """
     return path.name.lower().endswith((*WORLD_ENDINGS, *OTHER_ENDINGS))
 
 
@@ -43,7 +45,9 @@ def ending_of(world: Path) -> str:
 
 
 def check_ending(file: Path, world: Path) -> None:
-    """Whether `file` can hold a part of `world`: only its name says how it is read. Raises UserError."""
+    """Whether `file` can hold a part of `world`: only its name says how it is read. Raises
+    UserError.
+    """
     if is_directives(file) != is_directives(world):
         raise UserError(
             f"{file}: what is left of {world.name} needs a name that ends in {ending_of(world)}"
@@ -59,7 +63,9 @@ class Unusable(Exception):
 
 
 class MissingFiles(UserError):
-    """Required files cannot be used; `uris` are all of them, with the reason for those that were found, else empty."""
+    """Required files cannot be used; `uris` are all of them, with the reason for those that were
+    found, else empty.
+    """
 
     def __init__(self, message: str, uris: Mapping[str, str]) -> None:
         super().__init__(message)
@@ -67,7 +73,9 @@ class MissingFiles(UserError):
 
 
 class Unsupported(UserError):
-    """An element of the kind `tag` is not supported, but can be left out; `name` says in which file."""
+    """An element of the kind `tag` is not supported, but can be left out; `name` says in which
+    file.
+    """
 
     def __init__(self, message: str, tag: Ignorable, file: Path) -> None:
         super().__init__(message)
@@ -76,7 +84,9 @@ class Unsupported(UserError):
 
 
 def read(path: Path, limit: int) -> bytes:
-    """The bytes of the file `path`. Raises Unusable if it is not a regular file, is unreadable or exceeds `limit` bytes."""
+    """The bytes of the file `path`. Raises Unusable if it is not a regular file, is unreadable or
+    exceeds `limit` bytes.
+    """
     size = size_of(path)
     if size > limit:
         raise Unusable(f"{size / 1e6:.0f} MB is too large; the maximum is {limit / 1e6:.0f} MB")
@@ -138,7 +148,9 @@ def folders_of(folder: Path) -> list[str]:
 
 
 def is_file(path: Path) -> bool:
-    """Whether `path` is an accessible file. Any text is taken for a path: one that is too long, or holds a NUL byte, is none."""
+    """Whether `path` is an accessible file. Any text is taken for a path: one that is too long, or
+    holds a NUL byte, is none.
+    """
     return os.path.isfile(path)  # noqa: PTH113  # `Path.is_file` may raise
 
 
@@ -157,7 +169,9 @@ def reason(error: OSError) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a file. Raises UserError if it is missing, unreadable or larger than `MAX_BYTES`."""
+    """The content of a file. Raises UserError if it is missing, unreadable or larger than
+    `MAX_BYTES`.
+    """
     try:
         return read(path, MAX_BYTES)
     except Unusable as error:
@@ -165,7 +179,9 @@ def read_bytes(path: Path) -> bytes:
 
 
 def resolved(path: Path) -> Path:
-    """The whole path of a file. Raises UserError for one that is not UTF-8: run files, which are JSON, cannot hold it."""
+    """The whole path of a file. Raises UserError for one that is not UTF-8: run files, which are
+    JSON, cannot hold it.
+    """
     whole = path.resolve()
     try:
         str(whole).encode()
@@ -177,7 +193,8 @@ def resolved(path: Path) -> Path:
 
 
 def write_file(path: Path, content: bytes, mode: int = 0o666) -> None:
-    """Writes `content` atomically: to a temporary file beside `path`, which is then renamed. Raises UserError.
+    """Writes `content` atomically: to a temporary file beside `path`, which is then renamed. Raises
+    UserError.
 
     `mode` are the file's permissions, from which the user's mask takes away.
     """

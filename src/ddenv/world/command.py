@@ -30,10 +30,11 @@ def start_folder(scenario: Scenario) -> Path:
 
 
 def command_words(scenario: Scenario) -> tuple[str, ...]:
-    """The words of the oracle's command, the absolute path of its program first, placeholders unfilled; () without a command.
+    """The words of the oracle's command, the absolute path of its program first, placeholders
+    unfilled; () without a command.
 
-    Raises UserError for an unknown placeholder, a missing folder, and a program that is missing or not executable; for a simulator
-    in Python, if its module is missing.
+    Raises UserError for an unknown placeholder, a missing folder, and a program that is missing or
+    not executable; for a simulator in Python, if its module is missing.
     """
     if scenario.oracle is None:
         return ()
@@ -81,7 +82,9 @@ def _existing(scenario: Scenario) -> Path:
 
 
 def _program(word: str, folder: Path) -> str:
-    """The absolute path of the program `word`, relative to `folder` if it has a slash, else from PATH. Raises UserError."""
+    """The absolute path of the program `word`, relative to `folder` if it has a slash, else from
+    PATH. Raises UserError.
+    """
     path = folder.absolute() / word
     if "/" not in word:
         if found := shutil.which(word):

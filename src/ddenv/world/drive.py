@@ -1,4 +1,6 @@
-"""The drive of a wheeled robot: which joints are wheels, how fast each must turn for a command, and how far each rolls on a way."""
+"""The drive of a wheeled robot: which joints are wheels, how fast each must turn for a command, and
+how far each rolls on a way.
+"""
 
 from __future__ import annotations
 
@@ -45,16 +47,20 @@ class Twist(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class WheelSpeeds:
-    """Angular speeds of the wheel joints by name, rad/s, positive forward. A wheel that is not named stands still."""
+    """Angular speeds of the wheel joints by name, rad/s, positive forward. A wheel that is not
+    named stands still.
+    """
 
     speeds: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """The wheel joints by name, in the model's order; `left` is True for those on the left side. `radius` and `track` in m.
+    """The wheel joints by name, in the model's order; `left` is True for those on the left side.
+    `radius` and `track` in m.
 
-    `signs` are 1 for wheels whose joint velocity is positive when they roll forward, and -1 for the others.
+    `signs` are 1 for wheels whose joint velocity is positive when they roll forward, and -1 for the
+    others.
     """
 
     joints: Names
@@ -91,7 +97,10 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
     if wheels is None:
         sides = {joint.name: _side(robot, joint) > 0 for joint in robot.joints if _turns(joint)}
         if set(sides.values()) != {True, False}:
-            why = "expected wheels on both sides: joints that turn, left and right of the model's x axis"
+            why = (
+                "expected wheels on both sides: joints that turn, left and right of the model's "
+                "x axis"
+            )
             raise UserError(f"robot '{robot.name}': {why}; or name them in robot.wheels")
     else:
         sides = _named(robot, wheels)
@@ -109,7 +118,8 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
     track = sum(left) / len(left) - sum(right) / len(right)
     if track < NARROWEST:
         raise UserError(
-            f"robot.wheels: the left wheels of '{robot.name}' must lie to the left of the right ones"
+            f"robot.wheels: the left wheels of '{robot.name}' must lie to the left of the right "
+            "ones"
         )
     return Drive(
         joints=tuple(joint.name for joint in joints),
@@ -142,12 +152,13 @@ def wheel_links(robot: Model, joint: Joint) -> list[Link]:
 
 
 def rolled(robot: Model, drive: Drive, skid: float, rows: Floats) -> Floats:
-    """How far the left and the right wheels have turned at each of `rows`, shape (N, 2), rad, positive forward.
+    """How far the left and the right wheels have turned at each of `rows`, shape (N, 2), rad,
+    positive forward.
 
-    A run records where the robot was, not how its wheels turned. This is worked out from its way, by the kinematics of a
-    skid-steer: it moves along its x axis without slip, and turns by `skid` of what its wheels command. Wheels that spin or slide
-    turn otherwise.
-    `rows` are the motion of the robot's first link, shape (N, 8): t (s), x, y, z (m), qw, qx, qy, qz.
+    A run records where the robot was, not how its wheels turned. This is worked out from its way,
+    by the kinematics of a skid-steer: it moves along its x axis without slip, and turns by `skid`
+    of what its wheels command. Wheels that spin or slide turn otherwise. `rows` are the motion of
+    the robot's first link, shape (N, 8): t (s), x, y, z (m), qw, qx, qy, qz.
     """
     if len(rows) < 2:
         return np.zeros((len(rows), 2))
@@ -166,7 +177,9 @@ def rolled(robot: Model, drive: Drive, skid: float, rows: Floats) -> Floats:
 
 
 def footprint(robot: Model) -> tuple[float, float, float, float]:
-    """How far the collision shapes of `robot` extend from its origin, m: ahead, behind, to its left, to its right."""
+    """How far the collision shapes of `robot` extend from its origin, m: ahead, behind, to its
+    left, to its right.
+    """
     box = bounds(robot.collisions, robot.pose.inverse())
     if box is None:
         return 0.0, 0.0, 0.0, 0.0
@@ -222,7 +235,9 @@ def _radius(robot: Model, joint: Joint) -> float:
 
 
 def _round(collision: Collision, axis: Vector) -> float:
-    """The radius of a wheel that turns about the unit vector `axis`, m; 0 for a shape that is not round."""
+    """The radius of a wheel that turns about the unit vector `axis`, m; 0 for a shape that is not
+    round.
+    """
     across = np.eye(3) - np.outer(axis, axis)
     match collision.shape:
         case Cylinder(radius) | Sphere(radius) | Capsule(radius):

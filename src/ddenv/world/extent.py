@@ -1,4 +1,6 @@
-"""The extent of shapes and models: boxes in the world frame, m, also in place of endless planes; and convex hulls in the plane."""
+"""The extent of shapes and models: boxes in the world frame, m, also in place of endless planes;
+and convex hulls in the plane.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ Bounds = tuple[np.ndarray, np.ndarray]
 
 
 def shape_bounds(shape: Shape, pose: Pose) -> Bounds:
-    """Lowest and highest corner, each shape (3,), of `shape` at `pose`. A plane has a place but no size."""
+    """Lowest and highest corner, each shape (3,), of `shape` at `pose`. A plane has a place but no
+    size.
+    """
     center = np.array(pose.position)
     rotation = pose.rotation()
     up = np.abs(rotation[:, 2])
@@ -59,13 +63,16 @@ def shape_bounds(shape: Shape, pose: Pose) -> Bounds:
     return center - half, center + half
 
 
-# Sides of the prism that stands for a cylinder, and meridians of the ball that stands for an ellipsoid.
+# Sides of the prism that stands for a cylinder, and meridians of the ball that stands for an
+# ellipsoid.
 SIDES = 16
 _CUBE = np.array(list(product((-0.5, 0.5), repeat=3)))
 
 
 def vertices_of(shape: Shape, sides: int = SIDES) -> tuple[np.ndarray, float]:
-    """The vertices (N, 3) m of a shape other than ground in its own frame, and how much it is larger than their hull, m."""
+    """The vertices (N, 3) m of a shape other than ground in its own frame, and how much it is
+    larger than their hull, m.
+    """
     ends = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
     match shape:
         case Box(size):
@@ -94,7 +101,9 @@ def circle(sides: int) -> np.ndarray:
 
 
 def filled_bounds(collision: Collision) -> Bounds:
-    """The box around what a shape fills: all that is below a plane or terrain, everything if a plane leans."""
+    """The box around what a shape fills: all that is below a plane or terrain, everything if a
+    plane leans.
+    """
     low, high = shape_bounds(collision.shape, collision.pose)
     if isinstance(collision.shape, Terrain):
         low[2] = -np.inf
@@ -122,7 +131,8 @@ def around(boxes: Iterable[Bounds]) -> Bounds | None:
 
 
 def bounds(collisions: Iterable[Collision], frame: Pose = HERE) -> Bounds | None:
-    """The box around all `collisions` except planes, along the axes of a frame in which the world is at `frame`.
+    """The box around all `collisions` except planes, along the axes of a frame in which the world
+    is at `frame`.
 
     None if there are none.
     """
@@ -134,18 +144,24 @@ def bounds(collisions: Iterable[Collision], frame: Pose = HERE) -> Bounds | None
 
 
 def center(model: Model) -> Vector:
-    """The centre of the box around a model, m, which may be far from its frame; the origin of its frame if it fills nothing."""
+    """The centre of the box around a model, m, which may be far from its frame; the origin of its
+    frame if it fills nothing.
+    """
     box = model_bounds(model)
     return model.pose.position if box is None else vector((box[0] + box[1]) / 2)
 
 
 def model_bounds(model: Model) -> Bounds | None:
-    """The box around a model's collisions; None for the ground and for models that nothing can touch."""
+    """The box around a model's collisions; None for the ground and for models that nothing can
+    touch.
+    """
     return bounds(model.collisions)
 
 
 def convex_hull(points: np.ndarray) -> np.ndarray:
-    """The corners (M, 2) of the convex hull of `points` (N, 2), anticlockwise (Andrew's monotone chain)."""
+    """The corners (M, 2) of the convex hull of `points` (N, 2), anticlockwise (Andrew's monotone
+    chain).
+    """
     ordered = sorted({(round(float(x), 6), round(float(y), 6)) for x, y in points})
     if len(ordered) < 3:
         return np.array(ordered).reshape(-1, 2)
@@ -184,9 +200,11 @@ def corners(world: World) -> tuple[Vector, Vector] | None:
 def with_ground_boxes(
     world: World, box: tuple[Vector, Vector] | None, places: Iterable[Vector] = ()
 ) -> World:
-    """`world` with a box for each plane, wide enough for all between two corners and for `places` (m, world frame).
+    """`world` with a box for each plane, wide enough for all between two corners and for `places`
+    (m, world frame).
 
-    Drake crashes with half spaces among hundreds of boxes, and on the bodies that its parser makes of static models (drake#19263).
+    Drake crashes with half spaces among hundreds of boxes, and on the bodies that its parser makes
+    of static models (drake#19263).
     """
     if not any(isinstance(one.shape, Plane) for one in world.collisions):
         return world

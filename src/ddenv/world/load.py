@@ -1,4 +1,6 @@
-"""Loads a scenario from YAML, with complaints that name the file, the key, the value and what is allowed."""
+"""Loads a scenario from YAML, with complaints that name the file, the key, the value and what is
+allowed.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,9 @@ PLAINLY = {
 
 
 def find_scenario(name: str) -> Path:
-    """The file of a bundled scenario, or the path itself. Raises UserError, with the nearest name for a typo."""
+    """The file of a bundled scenario, or the path itself. Raises UserError, with the nearest name
+    for a typo.
+    """
     path = Path(name)
     if is_folder(path):
         raise UserError(f"{name}: is a folder; expected a scenario's name or file")
@@ -50,7 +54,8 @@ def find_scenario(name: str) -> Path:
         return bundled
     names = bundled_names()
     raise UserError(
-        f"no scenario '{name}'{nearest(name, names)}; bundled are {', '.join(names)}; or give a YAML file"
+        f"no scenario '{name}'{nearest(name, names)}; bundled are {', '.join(names)}; or give a "
+        "YAML file"
     )
 
 
@@ -70,7 +75,8 @@ def load_scenario(path: Path) -> Scenario:
 
 
 def load_simulator(path: Path) -> Oracle:
-    """The simulator in the YAML file `path`, which has the keys of a scenario's `oracle`; it starts in the file's folder.
+    """The simulator in the YAML file `path`, which has the keys of a scenario's `oracle`; it starts
+    in the file's folder.
 
     Raises UserError.
     """
@@ -108,11 +114,15 @@ def validate(data: Data, where: str, named: Mapping[str, str] = {}) -> Scenario:
         scenario = Scenario.model_validate(data)
     except ValidationError as error:
         raise _wrong(where, *complaint(error.errors()[0], Scenario), named) from None
-    # Not the model's own matter: a run is shown also where the package that brought its schemas is missing.
+    # Not the model's own matter: a run is shown also where the package that brought its schemas is
+    # missing.
     known = {
         kind: list(schemas.names(kind)) for kind in ("algorithm", "partitioning", "prioritization")
     }
-    pairs = f"{', '.join(known['partitioning'])}, then '/', then one of {', '.join(known['prioritization'])}"
+    pairs = (
+        f"{', '.join(known['partitioning'])}, then '/', then one of "
+        f"{', '.join(known['prioritization'])}"
+    )
     for key, value, names, allowed in (
         (
             "algorithm",
@@ -133,7 +143,9 @@ def _wrong(where: str, key: str, words: str, named: Mapping[str, str]) -> UserEr
 
 
 def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
-    """One of pydantic's errors in our words: the key; then what is wrong with its value, and what is allowed."""
+    """One of pydantic's errors in our words: the key; then what is wrong with its value, and what
+    is allowed.
+    """
     location = [str(part) for part in error["loc"]]
     key = ".".join(location)
     kind = error["type"]
@@ -154,7 +166,11 @@ def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
         allowed = error["ctx"]["expected"].replace("'", "").replace(" or ", ", ")
         return (
             key,
-            f"{found} is not allowed{nearest(str(error['input']), allowed.split(', '))}; use one of {allowed}",
+            (
+                f"{found} is not allowed{nearest(str(error['input']), allowed.split(', '))}; use "
+                "one "
+                f"of {allowed}"
+            ),
         )
     if kind == "string_pattern_mismatch" and key == "controller.use":
         return key, f"expected straight, costmap or module:Class, found {found}"

@@ -1,4 +1,5 @@
-"""A world as plain frozen data: the part of an SDF file that the simulator, the maps and the writer need.
+"""A world as plain frozen data: the part of an SDF file that the simulator, the maps and the writer
+need.
 
 Poses are absolute (in the world frame), lengths in m, masses in kg, angles in rad.
 """
@@ -38,14 +39,18 @@ class Sphere:
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """Infinite ground with its normal along its frame's z axis; `size` only limits what is drawn."""
+    """Infinite ground with its normal along its frame's z axis; `size` only limits what is
+    drawn.
+    """
 
     size: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Capsule:
-    """A cylinder of `length` along its frame's z axis, with a hemisphere of the same radius on each end."""
+    """A cylinder of `length` along its frame's z axis, with a hemisphere of the same radius on each
+    end.
+    """
 
     radius: float
     length: float
@@ -60,10 +65,11 @@ class Ellipsoid:
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A closed surface: `vertices` (N, 3) m, `faces` (M, 3) vertex indices, counterclockwise seen from outside.
+    """A closed surface: `vertices` (N, 3) m, `faces` (M, 3) vertex indices, counterclockwise seen
+    from outside.
 
-    Convex in a collision. Meshes are equal if they have the same `origin`: the same file, read in the same way. A `simplified`
-    mesh is the convex hull of one that is too fine to be drawn.
+    Convex in a collision. Meshes are equal if they have the same `origin`: the same file, read in
+    the same way. A `simplified` mesh is the convex hull of one that is too fine to be drawn.
     """
 
     origin: str
@@ -74,7 +80,8 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True)
 class Terrain:
-    """Solid ground below `heights` (R, C) m, which lie on a grid of `size` (x, y) m around its frame's origin.
+    """Solid ground below `heights` (R, C) m, which lie on a grid of `size` (x, y) m around its
+    frame's origin.
 
     Rows follow y, columns x. Between four heights the surface is bilinear.
     Terrains are equal if they have the same `origin`, as meshes are.
@@ -102,8 +109,8 @@ class Piece:
 class Collision:
     """`mu` is the Coulomb friction coefficient: the smaller of SDF's `ode/mu` and `ode/mu2`.
 
-    The pieces of a mesh that is not convex follow each other in their link, all with the `name` of their `<collision>`;
-    `piece` says what they are pieces of.
+    The pieces of a mesh that is not convex follow each other in their link, all with the `name` of
+    their `<collision>`; `piece` says what they are pieces of.
     """
 
     name: str
@@ -125,7 +132,8 @@ class Visual:
 
 @dataclass(frozen=True, slots=True)
 class Inertia:
-    """Mass and rotational inertia about the centre of mass, in the axes of `pose`, whose origin is that centre.
+    """Mass and rotational inertia about the centre of mass, in the axes of `pose`, whose origin is
+    that centre.
 
     `moments` are ixx, iyy, izz and `products` ixy, ixz, iyz in kg m^2.
     """
@@ -147,11 +155,13 @@ class Link:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
-    """A joint between two links of one model; `pose` is the joint frame, `axis` a unit vector in the world frame.
+    """A joint between two links of one model; `pose` is the joint frame, `axis` a unit vector in
+    the world frame.
 
-    `kind` is SDF's type: fixed, revolute, continuous, prismatic, ball or universal (turns about `axis`, then about the
-    perpendicular `axis2`). Limits are relative to the initial pose of the links: rad, or m for a prismatic joint.
-    `effort` (N m or N) and `velocity` (rad/s or m/s) are infinite if unlimited. The parent may be "world".
+    `kind` is SDF's type: fixed, revolute, continuous, prismatic, ball or universal (turns about
+    `axis`, then about the perpendicular `axis2`). Limits are relative to the initial pose of the
+    links: rad, or m for a prismatic joint. `effort` (N m or N) and `velocity` (rad/s or m/s) are
+    infinite if unlimited. The parent may be "world".
     """
 
     name: str
@@ -182,11 +192,13 @@ def is_fixed(joint: Joint) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
-    """A model of the world, including the links and joints of its nested models (named `inner::link`).
+    """A model of the world, including the links and joints of its nested models (named
+    `inner::link`).
 
-    `name` is unique: the second model of one name is called `name #2`. `spans` are the byte ranges (start, end) of the file
-    that belong to it: its own element first, then its entry in `<state>`. `line` is its first line. `inside` is the model of the
-    file that it is a part of (`ddenv.world.sdf.inside`); "" for a whole model.
+    `name` is unique: the second model of one name is called `name #2`. `spans` are the byte ranges
+    (start, end) of the file that belong to it: its own element first, then its entry in `<state>`.
+    `line` is its first line. `inside` is the model of the file that it is a part of
+    (`ddenv.world.sdf.inside`); "" for a whole model.
     """
 
     name: str
@@ -210,7 +222,9 @@ class Model:
 
 
 def held_with(model: Model, name: str) -> frozenset[str]:
-    """The link `name` (or "world") and all that fixed joints hold together with it, directly or through others."""
+    """The link `name` (or "world") and all that fixed joints hold together with it, directly or
+    through others.
+    """
     held = {name}
     pairs = [{joint.parent, joint.child} for joint in model.joints if is_fixed(joint)]
     while new := {end for pair in pairs if pair & held for end in pair} - held:
@@ -219,13 +233,17 @@ def held_with(model: Model, name: str) -> frozenset[str]:
 
 
 def still_links(model: Model) -> tuple[Link, ...]:
-    """The links of `model` that never move: all if it is static, else those that fixed joints hold to the world."""
+    """The links of `model` that never move: all if it is static, else those that fixed joints hold
+    to the world.
+    """
     held = held_with(model, "world")
     return tuple(link for link in model.links if model.static or link.name in held)
 
 
 def jointed_links(model: Model) -> dict[str, Link]:
-    """By Drake's names, such as `arm::forearm`, the links of a model with joints that move; empty for any other model."""
+    """By Drake's names, such as `arm::forearm`, the links of a model with joints that move; empty
+    for any other model.
+    """
     if model.static or all(is_fixed(joint) for joint in model.joints):
         return {}
     return {f"{model.name}::{link.name}": link for link in model.links}
@@ -235,8 +253,9 @@ def jointed_links(model: Model) -> dict[str, Link]:
 class Note:
     """A part of the file that was replaced or ignored (`kind`).
 
-    `model` is the model it belongs to (empty: the world itself), `place` is file, line and XPath, `what` the element, `why`
-    the reason and the replacement. `detail` holds what differs between models with otherwise equal notes.
+    `model` is the model it belongs to (empty: the world itself), `place` is file, line and XPath,
+    `what` the element, `why` the reason and the replacement. `detail` holds what differs between
+    models with otherwise equal notes.
     """
 
     kind: Literal["replaced", "ignored"]
@@ -249,7 +268,9 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A file that a URI refers to, in the searched folder `root`, which `source` names, such as an environment variable."""
+    """A file that a URI refers to, in the searched folder `root`, which `source` names, such as an
+    environment variable.
+    """
 
     uri: str
     path: Path
@@ -259,7 +280,9 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """A byte range (start, end) of a world's text that goes when all of `models` are gone, and what is written `instead`."""
+    """A byte range (start, end) of a world's text that goes when all of `models` are gone, and what
+    is written `instead`.
+    """
 
     span: tuple[int, int]
     models: frozenset[str]
@@ -268,14 +291,16 @@ class Shared:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class World:
-    """An SDF world. `text` is the file's content; `models` are in the file's order; `gravity` is in m/s^2.
+    """An SDF world. `text` is the file's content; `models` are in the file's order; `gravity` is in
+    m/s^2.
 
-    `anchors` names the models that others depend on, which always stay: others are placed relative to them, or are copies of the
-    same text. `resources` holds everything read from other files (`ddenv.world.files.resources`), so that `text` can be read again
-    without them.
-    `ties` has (model, other) where a model is welded to another and so cannot stay without it. `shared` has byte ranges of `text`
-    that go when several models are gone. `found` are the other files that were read from disk, `absent` the URIs without one.
-    `guessed` has (model, URI) where a shape of the model is a guess.
+    `anchors` names the models that others depend on, which always stay: others are placed relative
+    to them, or are copies of the same text. `resources` holds everything read from other files
+    (`ddenv.world.files.resources`), so that `text` can be read again without them. `ties` has
+    (model, other) where a model is welded to another and so cannot stay without it. `shared` has
+    byte ranges of `text` that go when several models are gone. `found` are the other files that
+    were read from disk, `absent` the URIs without one. `guessed` has (model, URI) where a shape of
+    the model is a guess.
     """
 
     path: Path
@@ -309,7 +334,9 @@ class World:
         return tuple(model.name for model in self.models)
 
     def elements(self, protected: Collection[str] = ()) -> Names:
-        """Names of the models that a reduction may remove, in the file's order; a `protected` one stays with all its parts."""
+        """Names of the models that a reduction may remove, in the file's order; a `protected` one
+        stays with all its parts.
+        """
         parts = {model.name for model in self.models if model.inside in protected}
         stay = new = self.anchors.union(protected, parts)
         while new:
@@ -325,7 +352,8 @@ ENDLESS = 200.0
 
 
 def is_ground(model: Model) -> bool:
-    """Whether the model holds terrain, an infinite plane, or a box that stands for one (as `ddenv.world.write` writes it).
+    """Whether the model holds terrain, an infinite plane, or a box that stands for one (as
+    `ddenv.world.write` writes it).
 
     The ground carries everything else: it is never an element.
     """
@@ -339,7 +367,9 @@ def is_ground(model: Model) -> bool:
 
 
 def unique_names(names: Sequence[str], sign: str, others: Collection[str] = ()) -> list[str]:
-    """`names` with repeated ones made unique, also among `others`: with the `sign` " #" the second `name` becomes `name #2`, ..."""
+    """`names` with repeated ones made unique, also among `others`: with the `sign` " #" the second
+    `name` becomes `name #2`, ...
+    """
     given = Counter(others)
     taken = {*names, *others}
     unique = []

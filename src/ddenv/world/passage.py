@@ -1,8 +1,10 @@
-"""How wide the ways of a robot are, seen from above: whether it fits through the doors of a building.
+"""How wide the ways of a robot are, seen from above: whether it fits through the doors of a
+building.
 
-What blocks it is a step, up or down, that is higher than half the robot. So floors, carpets, low lips, ramps and what they lead
-to do not block; nor do lintels and ceilings, since only pieces that begin below the robot's top count, as filled below; nor does a
-trench, since what lies lower than the start counts as filled; nor do models that can move.
+What blocks it is a step, up or down, that is higher than half the robot. So floors, carpets, low
+lips, ramps and what they lead to do not block; nor do lintels and ceilings, since only pieces that
+begin below the robot's top count, as filled below; nor does a trench, since what lies lower than
+the start counts as filled; nor do models that can move.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ from ddenv.world.extent import shape_bounds, vertices_of
 from ddenv.world.model import Collision, Ellipsoid, Ground, World
 from ddenv.world.pose import Point
 
-# The width of a column, m, and about the maximum number of columns: in a large world they are wider.
+# The width of a column, m, and about the maximum number of columns: in a large world they are
+# wider.
 CELL = 0.025
 MOST = 500_000
 # A way that is wider than this leads through no door, m.
@@ -44,12 +47,16 @@ class Clearance:
     free: Floats
 
     def near(self, point: Point, distance: float) -> Booleans:
-        """The columns (N, M) that are at most `distance` (m) from `point`; at least the one that it is in."""
+        """The columns (N, M) that are at most `distance` (m) from `point`; at least the one that it
+        is in.
+        """
         away = np.linalg.norm(self.middles - point, axis=2)
         return np.asarray(away <= max(distance, away.min()))
 
     def joined(self, width: float, places: Booleans) -> Booleans:
-        """The columns (N, M) to which a way of this `width` (m) leads from one of the `places` (N, M)."""
+        """The columns (N, M) to which a way of this `width` (m) leads from one of the `places` (N,
+        M).
+        """
         from scipy.ndimage import label
 
         inside = self.free >= max(width, self.cell) / 2
@@ -57,16 +64,21 @@ class Clearance:
         return np.asarray(inside & np.isin(numbers, numbers[inside & places]))
 
     def widest(self, places: Booleans, others: Booleans) -> float:
-        """The width of the widest way from one of the `places` to one of the `others` (N, M), m; 0 if there is none."""
+        """The width of the widest way from one of the `places` to one of the `others` (N, M), m; 0
+        if there is none.
+        """
         widths = np.unique(2 * self.free)[1:]
         number = bisect_left(
             widths, True, key=lambda width: not self.joined(width, places)[others].any()
         )
-        # From middle to middle of two columns that block it is half a column farther, on average, than what is free.
+        # From middle to middle of two columns that block it is half a column farther, on average,
+        # than what is free.
         return float(widths[number - 1]) - self.cell / 2 if number else 0.0
 
     def outdoors(self) -> Booleans:
-        """The columns (N, M) that are reached from a corner of the world without going through a door."""
+        """The columns (N, M) that are reached from a corner of the world without going through a
+        door.
+        """
         open_ground = self.joined(DOOR, self.near(self.middles[0, 0], 0.0))
         return _distances(~open_ground) * self.cell <= DOOR / 2
 
@@ -74,7 +86,9 @@ class Clearance:
 def clearance(
     world: World, width: float, height: float, level: float, points: list[Point]
 ) -> Clearance:
-    """The clearance around all models and `points` for a robot of this size that stands on the height `level`, all in m."""
+    """The clearance around all models and `points` for a robot of this size that stands on the
+    height `level`, all in m.
+    """
     from scipy.ndimage import minimum_filter
 
     step = height / 2

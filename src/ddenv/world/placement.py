@@ -1,4 +1,6 @@
-"""How a world starts, without simulating it: whether the robot has room, how far it drops, which models are inside others."""
+"""How a world starts, without simulating it: whether the robot has room, how far it drops, which
+models are inside others.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +54,9 @@ def spawn_pose(spawn: Spawn) -> Pose:
 
 
 def check_spawn(world: World, robot: Model, spawn: Spawn, goal: Goal | None = None) -> None:
-    """Raises UserError if the robot, placed at `spawn`, stands inside a model or below the ground; it names a free place nearby."""
+    """Raises UserError if the robot, placed at `spawn`, stands inside a model or below the ground;
+    it names a free place nearby.
+    """
     if found := stands_inside(world, robot, spawn, goal):
         why, free = found
         hint = (
@@ -66,10 +70,11 @@ def check_spawn(world: World, robot: Model, spawn: Spawn, goal: Goal | None = No
 def stands_inside(
     world: World, robot: Model, spawn: Spawn, goal: Goal | None = None
 ) -> tuple[str, Spawn | None] | None:
-    """That the robot at `spawn` stands inside a model, in words, and the nearest free place; None if its own is free.
+    """That the robot at `spawn` stands inside a model, in words, and the nearest free place; None
+    if its own is free.
 
-    That is on a grid of `STEP`; None if there is none within `FAR`. Places from which a way leads to the `goal` come first.
-    Raises UserError for a robot without collision shapes.
+    That is on a grid of `STEP`; None if there is none within `FAR`. Places from which a way leads
+    to the `goal` come first. Raises UserError for a robot without collision shapes.
     """
     shapes, boxes = _shapes(world)
     if (found := _obstacle(shapes, boxes, robot, spawn)) is None:
@@ -101,7 +106,9 @@ def stands_inside(
 def _by_room(
     places: Iterable[Spawn], world: World, robot: Model, spawn: Spawn, goal: Goal
 ) -> list[Spawn]:
-    """Places near `spawn`, sorted: outdoors last if the goal is not, first those from which the robot gets to the goal."""
+    """Places near `spawn`, sorted: outdoors last if the goal is not, first those from which the
+    robot gets to the goal.
+    """
     room, width = _clearance(world, robot, spawn, goal)
     end = room.near((goal.x, goal.y), goal.tolerance)
     outdoors = room.outdoors()
@@ -145,7 +152,9 @@ def note_passage(world: World, robot: Model, spawn: Spawn, goal: Goal) -> Iterat
 
 
 def at_start(world: World, robot: Model, spawn: Spawn) -> Model | None:
-    """The first model that the robot at `spawn` stands inside of. Raises UserError for a robot without collision shapes."""
+    """The first model that the robot at `spawn` stands inside of. Raises UserError for a robot
+    without collision shapes.
+    """
     found = _obstacle(*_shapes(world), robot, spawn)
     return None if found is None else found[0]
 
@@ -159,7 +168,8 @@ def _shapes(world: World) -> tuple[list[tuple[Model, Collision]], Bounds]:
 def _obstacle(
     shapes: Sequence[tuple[Model, Collision]], boxes: Bounds, robot: Model, spawn: Spawn
 ) -> tuple[Model, float, Collision] | None:
-    """The first model that the robot at `spawn` is inside of, how deep, m, and in which shape; None if its place is free.
+    """The first model that the robot at `spawn` is inside of, how deep, m, and in which shape; None
+    if its place is free.
 
     `boxes` are around the shapes of all models, which come one model after another.
     """
@@ -193,7 +203,8 @@ def _depth(body: Hull, obstacle: Collision) -> float:
 INSIDE = 0.03
 # A robot that starts higher than this above the surface below it drops, m.
 DROP = 0.15
-# Wheels this far above the ground do not touch it, m: what is below is taken as large as the box around it.
+# Wheels this far above the ground do not touch it, m: what is below is taken as large as the box
+# around it.
 HANGING = 0.05
 # The maximum number of pairs of shapes that are compared: two fine meshes take a tenth of a second.
 MOST_PAIRS = 500
@@ -211,12 +222,17 @@ class Inside:
 def notes_on_start(
     world: World, robot: Model, spawn: Spawn, goal: Goal | None = None
 ) -> Iterator[tuple[str, str]]:
-    """What is wrong with the start of the robot in `world`, and with its `goal`: a word and a sentence for each."""
+    """What is wrong with the start of the robot in `world`, and with its `goal`: a word and a
+    sentence for each.
+    """
     height = drop(world, robot, spawn)
     if height > DROP:
         yield (
             "drop",
-            f"the robot starts {height:.2f} m above the surface below it and drops; lower the spawn's z",
+            (
+                f"the robot starts {height:.2f} m above the surface below it and drops; lower the "
+                "spawn's z"
+            ),
         )
     if world.gravity[2] >= 0.0:
         yield (
@@ -227,7 +243,11 @@ def notes_on_start(
     if hanging > HANGING:
         yield (
             "wheels",
-            f"no wheel touches anything: the robot stands on its body, its wheels {hanging:.2f} m above the ground",
+            (
+                "no wheel touches anything: the robot stands on its body, its wheels "
+                f"{hanging:.2f} "
+                "m above the ground"
+            ),
         )
     if goal is not None:
         yield from _note_goal(world, goal, spawn.z)
@@ -253,7 +273,9 @@ def _note_goal(world: World, goal: Goal, height: float) -> Iterator[tuple[str, s
 def note_floor(
     world: World, robot: Model, spawn: Spawn, removable: Collection[str]
 ) -> Iterator[tuple[str, str]]:
-    """That everything stands on one of the `removable` models, so that a test without it only shows that the robot falls."""
+    """That everything stands on one of the `removable` models, so that a test without it only shows
+    that the robot falls.
+    """
     standing = bounds(robot.collisions, spawn_pose(spawn) @ robot.pose.inverse())
     if standing is None or any(is_ground(model) for model in world.models):
         return
@@ -289,7 +311,8 @@ def note_inside(world: World) -> Iterator[tuple[str, str]]:
 
 
 def note_unseen(world: World, among: Collection[str]) -> Iterator[tuple[str, str]]:
-    """What `among` these models the robot may hit where nothing is seen, or not hit where something is.
+    """What `among` these models the robot may hit where nothing is seen, or not hit where something
+    is.
 
     A world without any visual is not made to be looked at.
     """
@@ -306,7 +329,9 @@ def note_unseen(world: World, among: Collection[str]) -> Iterator[tuple[str, str
 
 
 def _unlike(model: Model) -> str:
-    """The key of UNLIKE that says how the collisions of a model differ from its visuals; "" if they do not."""
+    """The key of UNLIKE that says how the collisions of a model differ from its visuals; "" if they
+    do not.
+    """
     hit = model_bounds(model)
     seen = around(shape_bounds(visual.shape, visual.pose) for visual in model.visuals)
     if seen is None:
@@ -367,7 +392,8 @@ def overlap_of(model: Model, other: Model) -> float:
 
 
 def drop(world: World, robot: Model, spawn: Spawn) -> float:
-    """How far the robot falls at least when it starts, m; 0 where nothing is below it: then the test says that it fell.
+    """How far the robot falls at least when it starts, m; 0 where nothing is below it: then the
+    test says that it fell.
 
     Everything is taken as large as the box around it.
     """
@@ -434,7 +460,8 @@ def distance(a: Hull, b: Hull) -> float:
     from scipy.optimize import nnls
 
     differences = _differences(a, b)
-    # Of all weighted means of the differences the one nearest to zero: least squares with a row that asks for a sum of 1.
+    # Of all weighted means of the differences the one nearest to zero: least squares with a row
+    # that asks for a sum of 1.
     weights, _ = nnls(
         np.vstack([differences.T, np.ones(len(differences))]), np.array([0.0, 0.0, 0.0, 1.0])
     )

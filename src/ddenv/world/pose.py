@@ -1,4 +1,6 @@
-"""Rigid poses and vectors as plain data, in SDF's convention; and the pose at any instant of a recorded motion."""
+"""Rigid poses and vectors as plain data, in SDF's convention; and the pose at any instant of a
+recorded motion.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ class Pose:
 
     @classmethod
     def from_rpy(cls, x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> Pose:
-        """SDF's `x y z roll pitch yaw`: m and rad, rotations about the fixed x, then y, then z axis."""
+        """SDF's `x y z roll pitch yaw`: m and rad, rotations about the fixed x, then y, then z
+        axis.
+        """
         cr = math.cos(roll / 2)
         sr = math.sin(roll / 2)
         cp = math.cos(pitch / 2)
@@ -117,7 +121,9 @@ def headings(quaternions: np.ndarray) -> np.ndarray:
 
 
 def angle_between(one: Sequence[float], other: Sequence[float]) -> float:
-    """The angle of the rotation between two unit quaternions, rad; q and -q are the same rotation."""
+    """The angle of the rotation between two unit quaternions, rad; q and -q are the same
+    rotation.
+    """
     likeness = abs(sum([a * b for a, b in zip(one, other, strict=True)]))
     return 2.0 * math.acos(min(1.0, likeness))
 
@@ -154,7 +160,9 @@ ONE: Vector = (1.0, 1.0, 1.0)
 
 
 def pose_at(samples: np.ndarray, time: float) -> Pose:
-    """The pose at simulated `time`, s, interpolated between rows (t, x, y, z, qw, qx, qy, qz) of `samples`."""
+    """The pose at simulated `time`, s, interpolated between rows (t, x, y, z, qw, qx, qy, qz) of
+    `samples`.
+    """
     import numpy as np
 
     after = int(np.clip(np.searchsorted(samples[:, 0], time), 1, max(1, len(samples) - 1)))

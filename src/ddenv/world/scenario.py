@@ -1,6 +1,8 @@
-"""A scenario: which robot goes where in which world, what its failure is, and how to reduce the world.
+"""A scenario: which robot goes where in which world, what its failure is, and how to reduce the
+world.
 
-Written as one YAML file, validated here. Lengths are in m, angles in rad, times in s unless a field's name says otherwise.
+Written as one YAML file, validated here. Lengths are in m, angles in rad, times in s unless a
+field's name says otherwise.
 """
 
 from __future__ import annotations
@@ -45,10 +47,11 @@ class Spawn(Section):
 class Reading(Section):
     """How the world's file is understood where it names other files.
 
-    `model_path` are folders that hold models. `stand_ins` maps the beginning of a URI to a simple shape that stands in for what
-    cannot be found there, such as `cylinder:0.3,1.0`, or `*`, all that is missing, to `auto`. `ignore` names kinds of elements
-    to leave out instead of refusing the file. With `inside`, each collision of a model that never moves is a model of its own.
-    What collides in place of a mesh that is not convex is `mesh`: its convex pieces, or its convex hull.
+    `model_path` are folders that hold models. `stand_ins` maps the beginning of a URI to a simple
+    shape that stands in for what cannot be found there, such as `cylinder:0.3,1.0`, or `*`, all
+    that is missing, to `auto`. `ignore` names kinds of elements to leave out instead of refusing
+    the file. With `inside`, each collision of a model that never moves is a model of its own. What
+    collides in place of a mesh that is not convex is `mesh`: its convex pieces, or its convex hull.
     """
 
     model_path: tuple[Path, ...] = ()
@@ -71,7 +74,8 @@ class Wheels(Section):
 class Robot(Section):
     """`model` is an SDF or URDF file, relative to the scenario's folder.
 
-    Without `wheels`, every joint that turns about one axis is a driven wheel, on the side of the model's x axis where it is.
+    Without `wheels`, every joint that turns about one axis is a driven wheel, on the side of the
+    model's x axis where it is.
     """
 
     model: Path
@@ -88,10 +92,11 @@ class Goal(Section):
 
 
 class Lidar(Section):
-    """A range sensor that turns about the robot's vertical; by default a SICK LMS1xx as a Husky carries it.
+    """A range sensor that turns about the robot's vertical; by default a SICK LMS1xx as a Husky
+    carries it.
 
-    `x`, `y`, `z` (m) are its place in the frame of the robot's first link. Beams are spread evenly over `angle`, the middle one
-    straight ahead.
+    `x`, `y`, `z` (m) are its place in the frame of the robot's first link. Beams are spread evenly
+    over `angle`, the middle one straight ahead.
     """
 
     rate: Positive = Field(default=10.0, description="scan rate, Hz")
@@ -108,9 +113,11 @@ class Lidar(Section):
 
 
 class Sensors(Section):
-    """Standard deviations of what is wrong with the robot's measurements, how often it measures, and its range sensor.
+    """Standard deviations of what is wrong with the robot's measurements, how often it measures,
+    and its range sensor.
 
-    The noise is drawn anew at every reading, a `*_bias` once in a run. A period is rounded to whole time steps.
+    The noise is drawn anew at every reading, a `*_bias` once in a run. A period is rounded to whole
+    time steps.
     """
 
     compass: NotNegative = Field(default=0.02, description="compass heading, rad")
@@ -138,7 +145,9 @@ class Sensors(Section):
 
 
 class Planner(Section):
-    """How the controller `costmap` finds its way, as move_base does: a map of what the lidar sees rolls along with the robot."""
+    """How the controller `costmap` finds its way, as move_base does: a map of what the lidar sees
+    rolls along with the robot.
+    """
 
     size: float = Field(default=12.0, ge=4, le=100, description="length and width of the map, m")
     resolution: float = Field(default=0.1, ge=0.02, le=0.5, description="cell size of the map, m")
@@ -162,8 +171,9 @@ class Planner(Section):
 class Controller(Section):
     """Who drives the robot, at a fixed period, and within which limits.
 
-    `use` is `straight` (to the goal in a straight line), `costmap` (around what the lidar sees, see `planner`), or your own
-    `module:Class`, whose module is searched in the scenario's folder first and which is given `options`.
+    `use` is `straight` (to the goal in a straight line), `costmap` (around what the lidar sees, see
+    `planner`), or your own `module:Class`, whose module is searched in the scenario's folder first
+    and which is given `options`.
     """
 
     use: str = Field(default="straight", pattern=r"^(straight|costmap|[\w.]+:\w+)$")
@@ -199,7 +209,9 @@ def _with_as_printed(schema: Data) -> None:
 
 
 class _Printed(Section):
-    """`as_printed: true` in a scenario file stands for the settings that it sets; it is not kept beside them."""
+    """`as_printed: true` in a scenario file stands for the settings that it sets; it is not kept
+    beside them.
+    """
 
     model_config = ConfigDict(json_schema_extra=_with_as_printed)
 
@@ -216,7 +228,8 @@ class _Printed(Section):
         for name, value in settings.PRINTED.items():
             if given.setdefault(name, value) != value:
                 raise _wrong(
-                    f"the paper has {name}: {value}, but {name} is {given[name]!r:.40}; leave one of them out"
+                    f"the paper has {name}: {value}, but {name} is {given[name]!r:.40}; leave "
+                    "one of them out"
                 )
         return given
 
@@ -280,9 +293,10 @@ def seed_of(reduction: Reduction, run: int) -> int:
 class Oracle(Section):
     """What runs the robot in place of Drake: any simulator, as a command or as a class in Python.
 
-    `command` is started in `folder`, by default the scenario's, without a shell; `{world}` stands for an SDF file, `{scenario}` for
-    a scenario in that world, `{seed}` for a number and `{log}` for the file of its pose log (without it, what the command prints).
-    `use` is a `module:Class` in its place, whose module is searched in `folder` first.
+    `command` is started in `folder`, by default the scenario's, without a shell; `{world}` stands
+    for an SDF file, `{scenario}` for a scenario in that world, `{seed}` for a number and `{log}`
+    for the file of its pose log (without it, what the command prints). `use` is a `module:Class` in
+    its place, whose module is searched in `folder` first.
     """
 
     command: str | None = Field(default=None, min_length=1)
@@ -306,10 +320,12 @@ class Oracle(Section):
 
 
 class Whole(Section):
-    """What a part of a world has from the whole of it, so that its runs stay the same to the last bit. `ddenv export` writes it.
+    """What a part of a world has from the whole of it, so that its runs stay the same to the last
+    bit. `ddenv export` writes it.
 
-    What is lower than `floor` (m) has fallen out of the world. `corners` (m) are the lowest and the highest of the box around its
-    models: the ground reaches beyond it. `moving` models can move, and share the time that is spent on how piles move.
+    What is lower than `floor` (m) has fallen out of the world. `corners` (m) are the lowest and the
+    highest of the box around its models: the ground reaches beyond it. `moving` models can move,
+    and share the time that is spent on how piles move.
     """
 
     floor: Finite
@@ -318,9 +334,11 @@ class Whole(Section):
 
 
 class Scenario(Section):
-    """Everything one reduction needs to know. `world` is an SDF file or model directives, relative to the scenario's folder.
+    """Everything one reduction needs to know. `world` is an SDF file or model directives, relative
+    to the scenario's folder.
 
-    `folder` is where an own controller's module and an oracle's command or module are found, by default the scenario's folder.
+    `folder` is where an own controller's module and an oracle's command or module are found, by
+    default the scenario's folder.
     """
 
     name: str = Field(min_length=1, max_length=80)

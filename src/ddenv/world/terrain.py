@@ -14,7 +14,9 @@ MOST_DRAWN = 160  # heights along each side of what is drawn
 
 
 def height_at(terrain: Terrain, x: Floats, y: Floats) -> Floats:
-    """The heights (...) m of the surface at `x` and `y` (...) m in its frame; NaN where there is no ground."""
+    """The heights (...) m of the surface at `x` and `y` (...) m in its frame; NaN where there is no
+    ground.
+    """
     rows, columns = terrain.heights.shape
     length, width = terrain.size
     return bilinear(
@@ -23,7 +25,9 @@ def height_at(terrain: Terrain, x: Floats, y: Floats) -> Floats:
 
 
 def bilinear(grid: Floats, row: Floats, column: Floats) -> Floats:
-    """The values (...) of `grid` (R, C) at these rows and columns (...), which need not be whole; NaN beyond its edge."""
+    """The values (...) of `grid` (R, C) at these rows and columns (...), which need not be whole;
+    NaN beyond its edge.
+    """
     # Loaded late: worlds without terrain are shown without it.
     from scipy.ndimage import map_coordinates
 
@@ -32,7 +36,9 @@ def bilinear(grid: Floats, row: Floats, column: Floats) -> Floats:
 
 
 def height_above(terrain: Terrain, pose: Pose, places: Floats) -> float:
-    """How high the lowest of `places` (N, 3) m is above the surface of terrain at `pose`, m; infinite where there is no ground."""
+    """How high the lowest of `places` (N, 3) m is above the surface of terrain at `pose`, m;
+    infinite where there is no ground.
+    """
     back = pose.inverse()
     x, y, z = (places @ back.rotation().T + back.position).T
     return float(np.nanmin(z - height_at(terrain, x, y), initial=math.inf))

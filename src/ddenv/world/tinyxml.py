@@ -1,8 +1,10 @@
-"""XML as TinyXML2 reads it, which is the parser of libsdformat: what Gazebo opens is read, what it refuses is refused.
+"""XML as TinyXML2 reads it, which is the parser of libsdformat: what Gazebo opens is read, what it
+refuses is refused.
 
-It is more tolerant than XML. Names with prefixes are plain text, a comment may hold `--`, an attribute may hold `<`, an `&` that
-begins no reference is text, and text and elements may stand beside the root. Elements know their bytes, so that a world can be
-written as it was. Entities are never expanded, and a DOCTYPE is refused.
+It is more tolerant than XML. Names with prefixes are plain text, a comment may hold `--`, an
+attribute may hold `<`, an `&` that begins no reference is text, and text and elements may stand
+beside the root. Elements know their bytes, so that a world can be written as it was. Entities are
+never expanded, and a DOCTYPE is refused.
 """
 
 from __future__ import annotations
@@ -15,7 +17,8 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 from xml.parsers import expat
 
-# Maximum nesting depth, as in TinyXML2 and far above that of real worlds: readers recurse once for each level.
+# Maximum nesting depth, as in TinyXML2 and far above that of real worlds: readers recurse once for
+# each level.
 DEEPEST = 100
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _NAME = rb"[A-Za-z_:\x80-\xff][A-Za-z0-9_:.\x80-\xff-]*+"
@@ -48,7 +51,8 @@ class NotXml(Exception):
 
 
 class Element(ElementTree.Element):
-    """An XML element with its file (`source`), its first `line`, its byte range (`start`, `end`) there, and its `parent`.
+    """An XML element with its file (`source`), its first `line`, its byte range (`start`, `end`)
+    there, and its `parent`.
 
     Its `text` is what stands before its first child. There are no `tail`s.
     """
@@ -72,7 +76,9 @@ class Element(ElementTree.Element):
 
 
 def parse_xml(text: bytes, source: Path, root: str = "") -> Element:
-    """The first element called `root` that stands in no other one, or else the first of any name. Raises NotXml."""
+    """The first element called `root` that stands in no other one, or else the first of any name.
+    Raises NotXml.
+    """
     if text.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in text[:100]:
         raise NotXml("is UTF-16, UTF-32 or not text; save it as UTF-8")
     start = len(BYTE_ORDER_MARK) if text.startswith(BYTE_ORDER_MARK) else 0
@@ -86,7 +92,9 @@ def parse_xml(text: bytes, source: Path, root: str = "") -> Element:
 
 
 def strict_fault(text: bytes) -> NotXml | None:
-    """Where and why a parser that keeps to the standard refuses `text`, which `parse_xml` reads; None if it reads it, too."""
+    """Where and why a parser that keeps to the standard refuses `text`, which `parse_xml` reads;
+    None if it reads it, too.
+    """
     begins = len(text) - len(text.removeprefix(BYTE_ORDER_MARK).lstrip())
     if not text.startswith(b"<", begins):
         # Of this expat would only say that it is not well-formed, and not always where.
@@ -109,7 +117,9 @@ def _located(text: bytes, at: int, why: str) -> NotXml:
 
 
 def _encoding(text: bytes, start: int) -> str:
-    """The encoding that the declaration names, by default UTF-8. Raises NotXml for one that does not extend ASCII."""
+    """The encoding that the declaration names, by default UTF-8. Raises NotXml for one that does
+    not extend ASCII.
+    """
     named = _ENCODING.match(text, start)
     if named is None:
         return "utf-8"
@@ -130,7 +140,9 @@ def _encoding(text: bytes, start: int) -> str:
 
 @dataclass(kw_only=True)
 class _Scanner:
-    """Reads `text` from byte `at` on. `open` are the elements around it, `words` the text so far of the innermost one."""
+    """Reads `text` from byte `at` on. `open` are the elements around it, `words` the text so far of
+    the innermost one.
+    """
 
     text: bytes
     source: Path
@@ -166,14 +178,18 @@ class _Scanner:
         return _located(self.text, at, f"not well-formed XML: {why}")
 
     def _add_text(self, end: int) -> None:
-        """Adds the text up to byte `end` to the innermost element, if it stands before its first child."""
+        """Adds the text up to byte `end` to the innermost element, if it stands before its first
+        child.
+        """
         if not self.open:
             self.may_declare = self.may_declare and not self.text[self.at : end].strip()
         elif end > self.at and not len(self.open[-1]):
             self.words.append(self._decoded(self.at, end))
 
     def _skip_markup(self, start: int) -> None:
-        """Skips a comment, or anything else that begins with `<!`; a CDATA section is text. Raises NotXml."""
+        """Skips a comment, or anything else that begins with `<!`; a CDATA section is text. Raises
+        NotXml.
+        """
         text = self.text
         if text[start + 2 : start + 9].upper() == b"DOCTYPE":
             raise _located(self.text, start, _NO_DOCTYPE)
@@ -193,14 +209,18 @@ class _Scanner:
         self.at = self._after(b"?>", start, 2, "what begins with '<?'")
 
     def _after(self, end: bytes, start: int, skipped: int, what: str) -> int:
-        """Where the next `end` ends; `what` begins at `start` with `skipped` bytes of its own. Raises NotXml."""
+        """Where the next `end` ends; `what` begins at `start` with `skipped` bytes of its own.
+        Raises NotXml.
+        """
         found = self.text.find(end, start + skipped)
         if found < 0:
             raise self.fault(start, f"{what} is not closed by '{end.decode()}'")
         return found + len(end)
 
     def _read_tag(self, start: int) -> bool:
-        """Reads a start or end tag. False for an end tag outside of all elements, where TinyXML2 stops. Raises NotXml."""
+        """Reads a start or end tag. False for an end tag outside of all elements, where TinyXML2
+        stops. Raises NotXml.
+        """
         self.may_declare = False
         found = _TAG.match(self.text, start)
         if found is None:

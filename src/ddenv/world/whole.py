@@ -1,4 +1,6 @@
-"""What all parts of a world share, so that a run in one of them has the same bits wherever that part was written."""
+"""What all parts of a world share, so that a run in one of them has the same bits wherever that
+part was written.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,10 @@
-"""Writes worlds as SDF: the original text without some models (`without`), or clean SDF 1.9 for Drake's parser (`convert`).
+"""Writes worlds as SDF: the original text without some models (`without`), or clean SDF 1.9 for
+Drake's parser (`convert`).
 
-Clean SDF holds exactly what the reader understood: poses after `<state>`, resolved frames, included and nested models
-written out, unique names, convex hulls of meshes in files of their own, and a large box for an infinite plane, since Drake
-crashes with half spaces on the welded bodies that its parser makes of static models (drake#19263).
+Clean SDF holds exactly what the reader understood: poses after `<state>`, resolved frames, included
+and nested models written out, unique names, convex hulls of meshes in files of their own, and a
+large box for an infinite plane, since Drake crashes with half spaces on the welded bodies that its
+parser makes of static models (drake#19263).
 """
 
 from __future__ import annotations
@@ -46,7 +48,9 @@ RESERVED = ("world", "WorldModelInstance", "DefaultModelInstance")
 
 
 def without(world: World, removed: frozenset[str]) -> bytes:
-    """The text of `world` without the models named in `removed` and their indentation; all other bytes stay. Raises ValueError."""
+    """The text of `world` without the models named in `removed` and their indentation; all other
+    bytes stay. Raises ValueError.
+    """
     unknown = removed.difference(world.names)
     if unknown:
         raise ValueError(f"no such model: {sorted(unknown)[0]}")
@@ -69,7 +73,9 @@ def without(world: World, removed: frozenset[str]) -> bytes:
 
 
 def convert(world: World, mesh_folder: str) -> tuple[bytes, dict[str, Mesh]]:
-    """`world` as SDF 1.9, and its meshes by the relative paths of their OBJ files, which lie in the folder `mesh_folder`."""
+    """`world` as SDF 1.9, and its meshes by the relative paths of their OBJ files, which lie in the
+    folder `mesh_folder`.
+    """
     files: dict[Mesh, str] = {}
     for link in (link for model in world.models for link in model.links):
         for shape in (
@@ -92,7 +98,9 @@ def convert(world: World, mesh_folder: str) -> tuple[bytes, dict[str, Mesh]]:
 
 
 def write_converted(world: World, path: Path) -> list[Path]:
-    """Writes `world` as clean SDF to `path`, its meshes to a folder beside it; returns the written files. Raises UserError."""
+    """Writes `world` as clean SDF to `path`, its meshes to a folder beside it; returns the written
+    files. Raises UserError.
+    """
     if path.resolve() == world.path.resolve():
         raise UserError(f"{path}: is the world itself; choose another file")
     folder = path.with_name(f"{path.stem}_meshes")
@@ -220,7 +228,9 @@ def primitive(shape: Shape) -> tuple[str, dict[str, tuple[float, ...]]]:
 
 
 def _pose(parent: Element, pose: Pose) -> None:
-    """Nothing for the identity; roll, pitch and yaw if only yaw turns, for readers; else a quaternion, which is exact."""
+    """Nothing for the identity; roll, pitch and yaw if only yaw turns, for readers; else a
+    quaternion, which is exact.
+    """
     w, x, y, z = pose.quaternion
     if x == 0.0 and y == 0.0:
         angles = (0.0, 0.0, pose.yaw())

@@ -1,4 +1,6 @@
-"""A Dask cluster of real programs on 127.0.0.1, and a simulator whose tests wait until they may end."""
+"""A Dask cluster of real programs on 127.0.0.1, and a simulator whose tests wait until they may
+end.
+"""
 
 import os
 import socket
@@ -13,7 +15,8 @@ from tests.conftest import DATA, ROOT
 from tests.engine.reading import told
 from tests.waiting import wait_until
 
-# Passes unless both the deck and the wall are there; leaves a file for each test that began, and waits while there is `hold`.
+# Passes unless both the deck and the wall are there; leaves a file for each test that began, and
+# waits while there is `hold`.
 SIMULATOR = """
 import os, pathlib, sys, time, uuid
 here = pathlib.Path(__file__).parent

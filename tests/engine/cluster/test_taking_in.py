@@ -34,7 +34,11 @@ def test_the_same_bits_are_taken_in_whatever_the_versions():
         (
             SAME,
             nudged(),
-            f"different bits; it has {simulator()}, {machine()}; this machine has {simulator()}, {machine()}",
+            (
+                f"different bits; it has {simulator()}, {machine()}; this machine has "
+                f"{simulator()}, "
+                f"{machine()}"
+            ),
         ),
         (replace(SAME, simulator="drake 0.1"), nudged(), "it has drake 0.1, "),
         (SAME, replace(HERE, took_part=frozenset({"wall"})), "different bits"),

@@ -1,4 +1,6 @@
-"""What stands for wheels, cylinders, capsules and meshes: as large as the file says, and exact in Drake against boxes."""
+"""What stands for wheels, cylinders, capsules and meshes: as large as the file says, and exact in
+Drake against boxes.
+"""
 
 from __future__ import annotations
 

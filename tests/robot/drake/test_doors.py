@@ -1,4 +1,6 @@
-"""Buildings of meshes: doors are open, walls are where they are, however a building is cut into pieces."""
+"""Buildings of meshes: doors are open, walls are where they are, however a building is cut into
+pieces.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ AHEAD = 2.0  # where a wall with a door stands, m ahead of the robot
 
 
 def walls(door: float) -> list[tuple[tuple[float, float, float], tuple[float, float, float]]]:
-    """The lowest and the highest corners of the walls of a house by hand, m: four around it, and one inside with a door."""
+    """The lowest and the highest corners of the walls of a house by hand, m: four around it, and
+    one inside with a door.
+    """
     half = SIZE / 2
     side = half - door / 2
     return [
@@ -51,7 +55,9 @@ def by_hand(door: float) -> list[Collision]:
 
 
 def cut(door: float, turn: float, order: int) -> list[Collision]:
-    """The house as one mesh that was cut while it was turned by `turn` degrees, its triangles in some order."""
+    """The house as one mesh that was cut while it was turned by `turn` degrees, its triangles in
+    some order.
+    """
     whole = Manifold()
     for low, high in walls(door):
         whole = whole + Manifold.cube(tuple(np.subtract(high, low))).translate(low)
@@ -106,6 +112,7 @@ def test_a_building_is_the_same_however_it_is_cut(drive, husky):
         for other in others:
             assert (other.outcome, other.failure) == (one.outcome, one.failure)
             apart.append(float(np.linalg.norm(np.subtract(other.end_pose[:3], one.end_pose[:3]))))
-    # A robot that slides along a wall with spinning wheels may end some cm away if a wall moves by 0.1 micrometres.
+    # A robot that slides along a wall with spinning wheels may end some cm away if a wall moves by
+    # 0.1 micrometres.
     assert sorted(apart)[-5] < 1e-3 and max(apart) < 0.05
     assert 0 < passed < STARTS

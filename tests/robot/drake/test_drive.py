@@ -72,7 +72,8 @@ def test_wheels_roll_as_far_as_the_way_makes_them(husky):
     assert rolled(husky, drive, 0.5, up) == pytest.approx(
         np.array([[0, 0], [1, 1], [0, 0]]) / drive.radius
     )
-    # A turn on the spot to the left, through south, of which half is lost: the wheels do what they were commanded.
+    # A turn on the spot to the left, through south, of which half is lost: the wheels do what they
+    # were commanded.
     around = way_of((1, 2, 0, 3.0, 0), (1, 2, 0, 3.0 + 1.0, 0))
     speeds = drive.wheel_speeds(Twist(0.0, 1.0), 0.5)
     assert rolled(husky, drive, 0.5, around)[-1] == pytest.approx(speeds[:2])
@@ -122,7 +123,8 @@ def test_sides_and_footprint_are_seen_from_the_model(husky):
 REFUSED = {
     "mistyped": (
         Wheels(left=("front_left_weel",), right=FRONT.right),
-        r"robot.wheels.left: there is no joint 'front_left_weel' \(did you mean front_left_wheel\?\); joints of 'husky' that turn "
+        r"robot.wheels.left: there is no joint 'front_left_weel' \(did you mean "
+        r"front_left_wheel\?\); joints of 'husky' that turn "
         "are front_left_wheel, .*, turret$",
     ),
     "fixed": (

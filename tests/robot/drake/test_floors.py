@@ -1,4 +1,6 @@
-"""The same floor, however it is cut: equal ends, kerbs as high as a ball climbs, bodies that do not sink, in any order."""
+"""The same floor, however it is cut: equal ends, kerbs as high as a ball climbs, bodies that do not
+sink, in any order.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ THICK = 0.5
 
 
 def box_mesh(size: tuple[float, float, float]) -> Mesh:
-    """A wedge-shaped slab with the box's front, top and bottom edges, which is no box: its back leans out by a centimetre."""
+    """A wedge-shaped slab with the box's front, top and bottom edges, which is no box: its back
+    leans out by a centimetre.
+    """
     corners = (
         np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size
     )
@@ -39,7 +43,9 @@ def box_mesh(size: tuple[float, float, float]) -> Mesh:
 def platform(
     height: float, cuts: list[float], across: list[float], frame: Pose = HERE, kind: str = "box"
 ) -> list[Collision]:
-    """A platform `height` (m) above the road, cut at the shares `cuts` of its length and `across` of its width."""
+    """A platform `height` (m) above the road, cut at the shares `cuts` of its length and `across`
+    of its width.
+    """
     xs = [EDGE + LENGTH * share for share in (0.0, *sorted(cuts), 1.0)]
     ys = [WIDTH * (share - 0.5) for share in (0.0, *sorted(across), 1.0)]
     pieces = []
@@ -99,7 +105,8 @@ def highest(climbs: Callable[[float], bool]) -> float:
 def test_a_wheel_climbs_what_a_ball_of_its_size_climbs(
     drive, husky, monkeypatch, mu, effort, share
 ):
-    # Against a box a ball is exact. It is too wide for a wheel, but nothing stands beside the robot here.
+    # Against a box a ball is exact. It is too wide for a wheel, but nothing stands beside the robot
+    # here.
     def rough(parts: list[Collision]) -> Model:
         return static("platform", *(replace(part, mu=mu) for part in parts))
 

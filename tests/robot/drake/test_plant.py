@@ -1,4 +1,6 @@
-"""Models that move: what is hit, and what joints let move, about or along which axis, and how far."""
+"""Models that move: what is hit, and what joints let move, about or along which axis, and how
+far.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Worlds of many models: the plant has only what comes near, and every bit of a run is as if it had all."""
+"""Worlds of many models: the plant has only what comes near, and every bit of a run is as if it had
+all.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ EVERYTHING = 10**9
 
 @pytest.fixture
 def world(world_of, add) -> World:
-    """In the robot's way a cube that it pushes against a wall; a pile that falls far away onto a shelf; crates all around."""
+    """In the robot's way a cube that it pushes against a wall; a pile that falls far away onto a
+    shelf; crates all around.
+    """
     crates = [
         cube(f"crate {x} {y}", 4 * x, 4 * y, mass=None)
         for x in range(-4, 8)

@@ -1,4 +1,6 @@
-"""Shapes of collisions: the robot runs into them, moving ones lie without creeping, and wheels grip them as in Gazebo."""
+"""Shapes of collisions: the robot runs into them, moving ones lie without creeping, and wheels grip
+them as in Gazebo.
+"""
 
 from __future__ import annotations
 
@@ -165,7 +167,8 @@ def drive(
     return Template(world_of(ground), husky, scenario).run(frozenset({"floor"}), seed=1)
 
 
-# The spheres of a fast wheel come and go within few steps, and each grips a step late: the faster, the smaller the steps must be.
+# The spheres of a fast wheel come and go within few steps, and each grips a step late: the faster,
+# the smaller the steps must be.
 @pytest.mark.parametrize(
     ("mu", "speed", "time_step"),
     [(0.0, 5.0, 0.005), (0.02, 1.0, 0.005), (0.02, 5.0, 0.0005), (0.1, 5.0, 0.0005)],

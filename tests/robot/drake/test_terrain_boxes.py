@@ -1,4 +1,6 @@
-"""The boxes in place of terrain lie at its surface, do not depend on a region, and are driven on as one box is."""
+"""The boxes in place of terrain lie at its surface, do not depend on a region, and are driven on as
+one box is.
+"""
 
 from __future__ import annotations
 

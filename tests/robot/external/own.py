@@ -39,7 +39,9 @@ def own_scenario(
 
 
 def processes_with(*marks: str) -> list[tuple[str, bytes]]:
-    """Processes in whose environment all of `marks` stand: what a test started has its token, whatever became of it."""
+    """Processes in whose environment all of `marks` stand: what a test started has its token,
+    whatever became of it.
+    """
     found = []
     for entry in Path("/proc").glob("[0-9]*"):
         try:

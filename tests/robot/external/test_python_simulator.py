@@ -1,4 +1,6 @@
-"""A simulator in Python: one object runs all tests, whatever it does wrong is one line, and nothing of it is left."""
+"""A simulator in Python: one object runs all tests, whatever it does wrong is one line, and nothing
+of it is left.
+"""
 
 import numpy as np
 import pytest
@@ -73,7 +75,10 @@ def test_rows_may_have_the_poses_of_links_at_joints(tmp_path, made):
     }
 
     def run(name):
-        rows = f"yield 0.0, AT, {{'{name}': AT}}\n        yield 0.1, AT, {{'{name}': (2, 0, 0, 0, 0, 0, 1)}}\n        return END"
+        rows = (
+            f"yield 0.0, AT, {{'{name}': AT}}\n        yield 0.1, AT, {{'{name}': (2, 0, 0, 0, "
+            "0, 0, 1)}\n        return END"
+        )
         return made(written(tmp_path, rows).model_copy(update=at)).run(
             frozenset({"post", "lever"}), 1
         )
@@ -173,7 +178,10 @@ def test_a_class_that_makes_no_object_is_one_line(tmp_path, monkeypatch, made):
         ("mine:Min", "module 'mine' has no class 'Min' (did you mean Mine?)"),
         (
             "mime:Mine",
-            f"there is no module 'mime' in {tmp_path.resolve()}, nor installed (did you mean mine?)",
+            (
+                f"there is no module 'mime' in {tmp_path.resolve()}, nor installed (did you mean "
+                "mine?)"
+            ),
         ),
         (
             "json:JSONDecoder",

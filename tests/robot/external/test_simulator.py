@@ -73,7 +73,10 @@ def test_the_command_gets_the_world_the_seed_and_the_scenario(simulator_of, tmp_
 
 
 def test_the_scenario_goes_along_in_the_reduced_world(simulator_of, tmp_path):
-    show = "import shutil, sys; shutil.copytree(sys.argv[1].rpartition('/')[0], 'shown'); print('0,0,0,0,0,0,0,1')"
+    show = (
+        "import shutil, sys; shutil.copytree(sys.argv[1].rpartition('/')[0], 'shown'); "
+        "print('0,0,0,0,0,0,0,1')"
+    )
     assert simulator_of(show, "{scenario}").run(frozenset({"deck", "wall"}), 5).outcome == "pass"
     (file,) = (tmp_path / "shown").glob("*.yaml")
     shown, own = load_scenario(file), load_scenario(DATA / "wall.yaml")
@@ -205,7 +208,8 @@ def test_what_breaks_is_an_error_with_its_reason(simulator_of, code, complaint):
     [
         ("1 / 0", "error"),
         ("raise ExceptionGroup('two', [ValueError('a'), KeyError('b')])", "error"),
-        # An exception that was caught and printed, or an interruption, is not the reason for the exit code.
+        # An exception that was caught and printed, or an interruption, is not the reason for the
+        # exit code.
         (
             "import sys; sys.excepthook(*caught()); print('going on', file=sys.stderr); exit(1)",
             "failed",
@@ -306,7 +310,10 @@ def test_a_model_that_is_not_there_is_refused(simulator_of):
 
 
 def test_drake_is_not_needed():
-    code = "import sys, ddenv.engine.worker, ddenv.robot.external.simulator; print('pydrake' in sys.modules)"
+    code = (
+        "import sys, ddenv.engine.worker, ddenv.robot.external.simulator; print('pydrake' in "
+        "sys.modules)"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == "False", done.stderr
 

@@ -1,5 +1,6 @@
-"""A robot without weight among circles and walls, all seen from above: it moves exactly as commanded, and its lidar is exact
-but for a little noise."""
+"""A robot without weight among circles and walls, all seen from above: it moves exactly as
+commanded, and its lidar is exact but for a little noise.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +49,9 @@ class Ground:
         return np.where(nearest <= RANGE, nearest, np.inf)
 
     def room(self, x: float, y: float, heading: float) -> float:
-        """How far (m) the robot's footprint is from everything; negative when it stands in something."""
+        """How far (m) the robot's footprint is from everything; negative when it stands in
+        something.
+        """
         ahead, behind, left, right = HUSKY
         px, py, radius = self._posts
         cosine, sine = math.cos(heading), math.sin(heading)
@@ -112,7 +115,9 @@ def drive(
     blind: bool = False,
     seed: int = 0,
 ) -> Drive:
-    """Drives until the robot has arrived or given up, at most `until` s; while it `slips` it does not move."""
+    """Drives until the robot has arrived or given up, at most `until` s; while it `slips` it does
+    not move.
+    """
     random = np.random.default_rng(seed)
     drove = Drive(Navigator(given))
     x, y, heading = start

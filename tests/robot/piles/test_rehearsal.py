@@ -1,4 +1,6 @@
-"""Rehearsals: scripts of piles, how a world comes to rest before the robot moves, and which models rest on which."""
+"""Rehearsals: scripts of piles, how a world comes to rest before the robot moves, and which models
+rest on which.
+"""
 
 from __future__ import annotations
 
@@ -58,7 +60,8 @@ def test_what_falls_and_what_rests_is_told_apart(world_of, add, simulator):
     assert (settled.restless, settled.broken) == ((), ())
     words = dict(notes_on(world, settled))
     assert words["unrest"].startswith(
-        "the world is not at rest at the start: 1 model moves before the robot arrives, falls by 1.0"
+        "the world is not at rest at the start: 1 model moves before the robot arrives, falls by "
+        "1.0"
     )
 
 
@@ -141,7 +144,8 @@ def pairs(simulator: Variants, world: World, *protected: str) -> list[tuple[str,
 def test_each_model_rests_on_what_carries_it_after_it_has_fallen(simulator, world_of, add):
     world = add(
         world_of(SHELF),
-        # It falls onto the shelf, and a second one onto the first; the third lands on the ground beside them.
+        # It falls onto the shelf, and a second one onto the first; the third lands on the ground
+        # beside them.
         cube("cup", 1.0, 3.0, 1.2),
         cube("lid", 1.0, 3.05, 1.7),
         cube("dropped", 1.0, 4.2, 1.0),

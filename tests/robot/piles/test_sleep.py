@@ -1,4 +1,6 @@
-"""Sleeping: what nobody comes near lies still, costs nothing and leaves no trace; what is met wakes in time."""
+"""Sleeping: what nobody comes near lies still, costs nothing and leaves no trace; what is met wakes
+in time.
+"""
 
 from __future__ import annotations
 
@@ -164,7 +166,8 @@ def test_the_robot_pushes_what_was_asleep_as_if_it_had_been_awake(template):
 
 @pytest.mark.rates
 def test_models_of_many_and_of_few_shapes_rest_on_each_other_and_are_pushed(template):
-    # At rest the cube lies a little within the tile. Drake must not look for contacts of one twin with another.
+    # At rest the cube lies a little within the tile. Drake must not look for contacts of one twin
+    # with another.
     pile = template(
         tile("tile", 2.0, 0.0), cube("cube", 2.0, 0.0, 0.349), tile("beside", 2.0, 0.905)
     )
@@ -200,7 +203,8 @@ def test_what_the_robot_sets_in_motion_wakes_what_it_comes_near(template):
     )
     last = result.motions["domino_6"]
     fallen = int((last[:, 3] < 0.4).argmax())
-    # The last one falls when the robot, which reaches 0.5 m ahead of its frame, is still far away from it.
+    # The last one falls when the robot, which reaches 0.5 m ahead of its frame, is still far away
+    # from it.
     assert fallen > 0
     assert result.trajectory[fallen, 1] + 0.5 < last[0, 1] - 1.0
 

@@ -1,4 +1,6 @@
-"""What a controller gets in a run: readings with noise at their rates, an estimate, and never the truth."""
+"""What a controller gets in a run: readings with noise at their rates, an estimate, and never the
+truth.
+"""
 
 from __future__ import annotations
 
@@ -102,8 +104,10 @@ def test_a_compass_that_points_wrong_leads_the_robot_astray(world_of, husky, sce
 def test_wheels_that_slip_are_believed(world_of, husky, scenario_of):
     """On ice the wheels turn, the robot does not get on, and its odometry says that it does."""
     ice = (
-        '<model name="ice"><static>true</static><pose>0 0 0.005 0 0 0</pose><link name="l"><collision name="c"><geometry><box>'
-        "<size>4 4 0.01</size></box></geometry><surface><friction><ode><mu>0.001</mu></ode></friction></surface>"
+        '<model name="ice"><static>true</static><pose>0 0 0.005 0 0 0</pose><link '
+        'name="l"><collision name="c"><geometry><box>'
+        "<size>4 4 "
+        "0.01</size></box></geometry><surface><friction><ode><mu>0.001</mu></ode></friction></surface>"
         "</collision></link></model>"
     )
     scenario = scenario_of(
@@ -168,7 +172,8 @@ def wheels(speed: float, rate: float) -> tuple[float, float]:
 
 
 def drive(moves, noise: Sensors, seed: int = 0, slip: float = 1.0):
-    """The true pose and the filter after arcs of (speed m/s, turn rate rad/s), each held for DT; a compass every second time.
+    """The true pose and the filter after arcs of (speed m/s, turn rate rad/s), each held for DT; a
+    compass every second time.
 
     The robot goes only `slip` of what its wheels say.
     """

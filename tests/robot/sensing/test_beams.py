@@ -28,9 +28,11 @@ from ddenv.world.pose import Pose
 from tests.robot.sensing.conftest import lidar_of, loose, scan, still
 from tests.tiers import examples
 
-# How deep a beam has to get into a shape, or how far to pass it, for both ways to agree on whether it meets it.
+# How deep a beam has to get into a shape, or how far to pass it, for both ways to agree on whether
+# it meets it.
 CLEAR = 1e-6
-# Of a plane, which is the top of a very large box: where it is all but parallel to the beams, how far they go is lost in rounding.
+# Of a plane, which is the top of a very large box: where it is all but parallel to the beams, how
+# far they go is lost in rounding.
 CLEAR_OF_PLANES = 1e-3
 
 
@@ -172,7 +174,9 @@ STEPS = 80
 
 
 def outside(shape: Shape, points: np.ndarray) -> np.ndarray:
-    """How far (N,) `points` (N, 3) in the shape's frame are outside: 0 on the surface, below 0 inside, convex; no distance."""
+    """How far (N,) `points` (N, 3) in the shape's frame are outside: 0 on the surface, below 0
+    inside, convex; no distance.
+    """
     x, y, z = points.T
     match shape:
         case Box(size):
@@ -195,10 +199,11 @@ def outside(shape: Shape, points: np.ndarray) -> np.ndarray:
 def first_met(
     shape: Shape, pose: Pose, origin: np.ndarray, ways: np.ndarray, farthest: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How far (N,) beams from `origin` along `ways` (N, 3) go until `shape` at `pose`, and how clear that is (N,).
+    """How far (N,) beams from `origin` along `ways` (N, 3) go until `shape` at `pose`, and how
+    clear that is (N,).
 
-    Infinite for those that miss it, and where `origin` is inside. It is clear by how deep a beam gets into the shape, or by how
-    far it stays outside.
+    Infinite for those that miss it, and where `origin` is inside. It is clear by how deep a beam
+    gets into the shape, or by how far it stays outside.
     """
     turn = pose.rotation()
     start, ways = (origin - pose.position) @ turn, ways @ turn

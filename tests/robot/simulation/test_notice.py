@@ -1,4 +1,6 @@
-"""Noticing: when the robot first had each model in view, and first touched it; and that this changes nothing else."""
+"""Noticing: when the robot first had each model in view, and first touched it; and that this
+changes nothing else.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,8 @@ def without_noticing(monkeypatch, make) -> RunResult:
 def test_a_wall_is_touched_when_the_robot_is_there(world_of, husky, scenario_of):
     result = run(Template(world_of(WALL), husky, scenario_of()), "wall")
     assert set(result.first_touched) == {"ground", "wall"}
-    # The bumper meets the wall, whose near side is at 1.4 m, within the 0.05 s between two looks at up to 1 m/s.
+    # The bumper meets the wall, whose near side is at 1.4 m, within the 0.05 s between two looks at
+    # up to 1 m/s.
     assert x_at(result, result.first_touched["wall"]) + FRONT == pytest.approx(1.4, abs=0.06)
     # It starts a little above the ground.
     assert result.first_touched["ground"] < 0.3
@@ -62,7 +65,8 @@ def test_what_is_within_range_is_sensed_before_it_is_touched(world_of, husky, sc
     result = run(Template(world_of(WALL, high, aside), husky, scenario), "wall", "lamp", "aside")
     assert result.first_sensed["wall"] < result.first_touched["wall"]
     assert x_at(result, result.first_sensed["wall"]) == pytest.approx(0.4, abs=0.12)
-    # The lamp hangs 1.3 m above: nowhere is it within range, and neither is the post that the robot passes by 1.9 m.
+    # The lamp hangs 1.3 m above: nowhere is it within range, and neither is the post that the robot
+    # passes by 1.9 m.
     assert set(result.first_sensed) == {"ground", "wall"}
     assert all(
         result.first_sensed[name] <= seconds for name, seconds in result.first_touched.items()

@@ -29,7 +29,9 @@ def failure(result, *, away=0.0, epsilon=0.33):
 
 @pytest.fixture(scope="module")
 def at_the_wall(world_of, husky, scenario_of):
-    """A robot spins its wheels at a wall for 3 s; then its estimate says that it is at the goal, and it stops."""
+    """A robot spins its wheels at a wall for 3 s; then its estimate says that it is at the goal,
+    and it stops.
+    """
     return Template(world_of(WALL), husky, scenario_of(failure={"timeout": 20.0}))
 
 
@@ -56,7 +58,9 @@ def test_at_the_border_of_f_a_robot_is_watched_to_the_end(at_the_wall, in_full):
 
 
 def test_while_its_controller_still_drives_a_robot_is_not_at_rest(world_of, husky, scenario_of):
-    """It stands at a wall for longer than any patience, with wheels that spin towards a goal far away."""
+    """It stands at a wall for longer than any patience, with wheels that spin towards a goal far
+    away.
+    """
     template = Template(
         world_of(WALL), husky, scenario_of(goal={"x": 90.0, "y": 0.0}, failure={"timeout": 14.0})
     )
@@ -67,7 +71,9 @@ def test_while_its_controller_still_drives_a_robot_is_not_at_rest(world_of, husk
 
 
 def test_a_robot_that_slides_slowly_is_not_stuck(husky, scenario_of, monkeypatch):
-    """It stops at once on a slight slope, on which its wheels creep: 1 cm in 8 s, then 9 cm in 30 s."""
+    """It stops at once on a slight slope, on which its wheels creep: 1 cm in 8 s, then 9 cm in 30
+    s.
+    """
     monkeypatch.setattr(navigate, "ARRIVED", 1e6)
     gravity = f"<gravity>{-9.81 * math.sin(0.06)} 0 {-9.81 * math.cos(0.06)}</gravity>"
     floor = box_model("floor", "0 0 -0.5 0 0 0", "60 20 1")

@@ -1,4 +1,6 @@
-"""Who took part in a run: without the others, and with no tie broken, every bit of it stays the same."""
+"""Who took part in a run: without the others, and with no tie broken, every bit of it stays the
+same.
+"""
 
 from __future__ import annotations
 
@@ -59,8 +61,8 @@ def sensed(result: RunResult, names: frozenset[str]) -> dict[str, float]:
 def is_implied(
     world: Variants, there: frozenset[str], more: frozenset[str] = frozenset(), seed: int = 1
 ) -> bool:
-    """Whether a run of `there` has the same bits with only what took part, `more` of it, and what these are tied to; and senses
-    what took part at the same times.
+    """Whether a run of `there` has the same bits with only what took part, `more` of it, and what
+    these are tied to; and senses what took part at the same times.
     """
     whole = world.run(there, seed)
     keep = with_ties(world, (whole.took_part & there) | (more & there), there)
@@ -93,7 +95,9 @@ def test_a_model_takes_part_if_a_beam_ends_on_it_that_somebody_reads(flat):
 
 
 def test_what_took_part_is_sensed_at_the_same_time_whatever_else_hides_it(flat):
-    """The robot runs into a wall, which a screen aside hides at first from a lidar that looks across. Nobody reads its scans."""
+    """The robot runs into a wall, which a screen aside hides at first from a lidar that looks
+    across. Nobody reads its scans.
+    """
     wall, screen = (
         still("wall", 3.0, 0.0, (0.2, 0.4, 1.5)),
         still("screen", 1.2, 1.4, (0.1, 0.5, 1.5)),

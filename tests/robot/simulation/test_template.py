@@ -1,4 +1,6 @@
-"""One world, many runs: how they end, who may listen, and that no run leaves a trace; also in smaller plants for what is left."""
+"""One world, many runs: how they end, who may listen, and that no run leaves a trace; also in
+smaller plants for what is left.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,8 @@ def test_reaches_its_goal_on_flat_ground(world_of, husky, scenario_of):
     assert (result.outcome, result.failure) == ("pass", "")
     x, y, z, *_ = result.end_pose
     assert np.hypot(x - 3.0, y) <= 0.5
-    # It stands on its wheels: their axes are 0.0328 m above the model's frame, and the tyres sink in by little.
+    # It stands on its wheels: their axes are 0.0328 m above the model's frame, and the tyres sink
+    # in by little.
     assert z == pytest.approx(0.1651 - 0.0328, abs=0.005)
     assert result.simulated_seconds == result.trajectory[-1, 0]
     # 2.5 m at up to 1 m/s, with 1 m/s^2 at the start.
@@ -201,7 +204,9 @@ ALL = frozenset({"a", "b", "c", "d"})
 
 @pytest.fixture
 def built(monkeypatch) -> list[frozenset[str]]:
-    """The moving models that are left out of each smaller plant which is built. Building is so cheap that it always pays."""
+    """The moving models that are left out of each smaller plant which is built. Building is so
+    cheap that it always pays.
+    """
     monkeypatch.setattr(variants, "BUILD", 0.0)
     monkeypatch.setattr(variants, "PAIR", 0.0)
     reported: list[frozenset[str]] = []

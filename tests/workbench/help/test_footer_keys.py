@@ -80,7 +80,9 @@ async def test_each_key_of_the_footer_does_something(run, scenarios, started, na
 
 
 async def press_all(app, pilot, pressed, asked):
-    """Presses the keys of the footer that were not yet; returns whether one of them left the screen."""
+    """Presses the keys of the footer that were not yet; returns whether one of them left the
+    screen.
+    """
     screen = app.screen
     for key in offered(app):
         if key in pressed or key not in offered(app):
@@ -93,8 +95,9 @@ async def press_all(app, pilot, pressed, asked):
         before = seen(app), asked()
         await pilot.press(key)
         await eventually(
-            lambda: not app.is_running or (seen(app), asked()) != before, lambda: f"{key}: nothing"
-        )  # noqa: B023
+            lambda before=before: not app.is_running or (seen(app), asked()) != before,
+            lambda key=key: f"{key}: nothing",
+        )
         while app.is_running and screen in app.screen_stack and app.screen is not screen:
             await pilot.press("escape")
             await pilot.pause()

@@ -1,4 +1,6 @@
-"""Keys that stand in the borders of dialogs and panes: each can be clicked, and does what the key does."""
+"""Keys that stand in the borders of dialogs and panes: each can be clicked, and does what the key
+does.
+"""
 
 import fake_moments
 import fake_run

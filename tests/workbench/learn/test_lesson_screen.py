@@ -1,4 +1,6 @@
-"""Lessons on the screen: the list, a lesson with right, wrong and skipped answers, and any run step by step."""
+"""Lessons on the screen: the list, a lesson with right, wrong and skipped answers, and any run step
+by step.
+"""
 
 import pytest
 from textual.widgets import OptionList, Static

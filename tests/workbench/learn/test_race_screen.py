@@ -1,4 +1,6 @@
-"""A race on the screen: test by test, back, run and paused, to the end; in a lesson, and of run files."""
+"""A race on the screen: test by test, back, run and paused, to the end; in a lesson, and of run
+files.
+"""
 
 import shutil
 import sqlite3

@@ -12,8 +12,8 @@ from ddenv.workbench.run.snapshot import Moments
 from tests.learn.lessons import RUNS
 from tests.tiers import slow
 
-# By algorithm, the lines of a first run, a re-run, a verdict with f, a reduction and the end. Splitting has a line of its own for
-# its last sweep.
+# By algorithm, the lines of a first run, a re-run, a verdict with f, a reduction and the end.
+# Splitting has a line of its own for its last sweep.
 LINES = {
     "ddenv": ({5}, {7}, {10}, {11}, {21}),
     "ddmin": ({4}, {5}, {6}, {6}, {8}),

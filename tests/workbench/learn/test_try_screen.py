@@ -1,4 +1,6 @@
-"""A student's own search on the screen: by keys and by mouse, right, wrong, skipped, and gone back to."""
+"""A student's own search on the screen: by keys and by mouse, right, wrong, skipped, and gone back
+to.
+"""
 
 import pytest
 from textual.widgets import Static

@@ -1,4 +1,6 @@
-"""Models are told apart by colours, and by fillings and letters where a terminal has few or none."""
+"""Models are told apart by colours, and by fillings and letters where a terminal has few or
+none.
+"""
 
 import numpy as np
 import pytest

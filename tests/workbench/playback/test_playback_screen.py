@@ -1,4 +1,6 @@
-"""Tests played back on the map: the robot moves with the time, frame by frame, alone or over another test, by keys and mouse."""
+"""Tests played back on the map: the robot moves with the time, frame by frame, alone or over
+another test, by keys and mouse.
+"""
 
 from array import array
 
@@ -178,9 +180,10 @@ async def test_models_move_where_their_motion_is_stored(runs):
         session.app.screen.opening.play_row(run.state.tests[0])
         screen = await settled(session)
         assert "1 model that moved" in str(screen.query_one("#playback-world").border_title)
-        centre = lambda: next(
-            each.center for each in screen.map.place.prints if each.name == "crate_03"
-        )  # noqa: E731
+
+        def centre():
+            return next(each.center for each in screen.map.place.prints if each.name == "crate_03")
+
         await session.press("right")
         assert centre() == pytest.approx((-1.8, -2.0))
         await session.press("end")

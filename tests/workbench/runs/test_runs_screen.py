@@ -26,7 +26,9 @@ from tests.tiers import slow
 
 @pytest.fixture
 def several(runs, run):
-    """crates-1 runs, done is finished, gone lost its engine, new was never started, broken is no run."""
+    """crates-1 runs, done is finished, gone lost its engine, new was never started, broken is no
+    run.
+    """
     fake_moments.mid_round(run).hold()
     fake_moments.finished(fake_run.FakeRun(runs / "done.ddenv")).close()
     fake_moments.mid_round(fake_run.FakeRun(runs / "gone [b]x.ddenv")).close()

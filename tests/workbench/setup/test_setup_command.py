@@ -137,7 +137,10 @@ async def test_the_options_of_the_command_line_are_part_of_it(scenarios, tmp_pat
     reading = {name: parsed[name] for name in READING}
     world = tmp_path / "house.sdf"
     boxes = "".join(
-        f"<collision name='{name}'><pose>3 {y} 0.5 0 0 0</pose><geometry><box><size>1 1 1</size></box></geometry></collision>"
+        (
+            f"<collision name='{name}'><pose>3 {y} 0.5 0 0 0</pose><geometry><box><size>1 1 "
+            "1</size></box></geometry></collision>"
+        )
         for name, y in (("left", 2), ("right", -2))
     )
     house = f"<model name='house'><static>1</static><link name='l'>{boxes}</link></model>"

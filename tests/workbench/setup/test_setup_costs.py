@@ -35,5 +35,6 @@ def test_tests_and_time_are_told():
     parts = "4 for the baseline, 35 for the search, 50 for the certificate"
     assert unknown == f"about 90 tests (35 to 200): {parts}; more if the failure is rare"
     assert whole_cost(scenario(budget=9), 43, 1, known) == (
-        "9 tests at most: 4 for the baseline, then the search; 25 s with 1 job at 3.0 s a test, as before"
+        "9 tests at most: 4 for the baseline, then the search; 25 s with 1 job at 3.0 s a test, "
+        "as before"
     )

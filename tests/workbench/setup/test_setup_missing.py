@@ -1,4 +1,6 @@
-"""Files that cannot be found are rows of the setup screen, each with a remedy that is remembered."""
+"""Files that cannot be found are rows of the setup screen, each with a remedy that is
+remembered.
+"""
 
 import json
 import shlex
@@ -27,11 +29,17 @@ BARREL, SHELF = "model://construction_barrel/barrel.dae", "model://old_shelf"
 
 def barrel(name, x):
     mesh = f"<collision name='c'><geometry><mesh><uri>{BARREL}</uri></mesh></geometry></collision>"
-    return f"<model name='{name}'><static>1</static><pose>{x} 2 0 0 0 0</pose><link name='l'>{mesh}</link></model>"
+    return (
+        f"<model name='{name}'><static>1</static><pose>{x} 2 0 0 0 0</pose><link "
+        f"name='l'>{mesh}</link></model>"
+    )
 
 
 SUN = "".join(f"<include><uri>model://{name}</uri></include>" for name in ("sun", "ground_plane"))
-INSIDE = f"{SUN}{barrel('one', 2)}{barrel('two', 4)}<include><uri>{SHELF}</uri><pose>6 -2 0 0 0 0</pose></include>"
+INSIDE = (
+    f"{SUN}{barrel('one', 2)}{barrel('two', 4)}<include><uri>{SHELF}</uri><pose>6 -2 0 0 0 "
+    "0</pose></include>"
+)
 
 
 @pytest.fixture
@@ -109,9 +117,15 @@ def collision(shape):
 
 
 async def test_elements_that_are_not_supported_are_left_out_once_the_user_says_so(tmp_path):
-    hill = f"<model name='hill'><static>1</static><link name='l'>{collision('<image/>')}</link></model>"
+    hill = (
+        "<model name='hill'><static>1</static><link "
+        f"name='l'>{collision('<image/>')}</link></model>"
+    )
     hinge = "<joint name='j' type='rope'><parent>l</parent><child>m</child></joint>"
-    cart = f"<model name='cart'><link name='l'>{collision('<box><size>1 1 1</size></box>')}</link><link name='m'/>"
+    cart = (
+        "<model name='cart'><link "
+        f"name='l'>{collision('<box><size>1 1 1</size></box>')}</link><link name='m'/>"
+    )
     models = f"<include><uri>{SHELF}</uri></include>{hill}{barrel('one', 4)}{cart}{hinge}</model>"
     path = tmp_path / "hills.world"
     path.write_text(f"<sdf version='1.6'><world name='w'>{models}</world></sdf>")
@@ -179,7 +193,10 @@ async def test_files_that_were_found_and_cannot_be_used_say_why_and_have_the_sam
         assert session.screen.preview.choice.world.names == ("keg", "one")
 
 
-CRATE = f"<model name='crate'><static>1</static><link name='l'>{collision('<box><size>2 1 1</size></box>')}</link></model>"
+CRATE = (
+    "<model name='crate'><static>1</static><link "
+    f"name='l'>{collision('<box><size>2 1 1</size></box>')}</link></model>"
+)
 
 
 @pytest.mark.filterwarnings(
@@ -273,7 +290,10 @@ async def test_a_folder_is_a_remedy_if_the_file_is_in_it(depot, tmp_path):
     folder = tmp_path / "my models" / "old_shelf"
     folder.mkdir(parents=True)
     shelf = "<collision name='c'><geometry><box><size>3 1 2</size></box></geometry></collision>"
-    text = f"<sdf version='1.6'><model name='shelf'><static>1</static><link name='l'>{shelf}</link></model></sdf>"
+    text = (
+        "<sdf version='1.6'><model name='shelf'><static>1</static><link "
+        f"name='l'>{shelf}</link></model></sdf>"
+    )
     (folder / "model.sdf").write_text(text)
     remember_remedies({SHELF: str(folder.parent), BARREL: str(folder.parent)})
     async with Opened() as session:

@@ -214,7 +214,11 @@ async def test_models_inside_each_other_are_told_of_a_world_without_a_start(scen
         session.fill(spawn_x="4", spawn_y="0", spawn_z="2", yaw="0")
         line = await says(
             session,
-            "▲ lower the spawn's z (+1): the robot starts 1.87 m above the surface below it and drops",
+            (
+                "▲ lower the spawn's z (+1): the robot starts 1.87 m above the surface below it "
+                "and "
+                "drops"
+            ),
         )
         assert why in line.tooltip.plain
         await session.open(scenarios / "crates.yaml")

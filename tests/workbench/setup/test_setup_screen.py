@@ -1,4 +1,6 @@
-"""The setup screen: its layout, the input that it accepts or refuses, and the run that it starts."""
+"""The setup screen: its layout, the input that it accepts or refuses, and the run that it
+starts.
+"""
 
 import fake_moments
 import fake_run

@@ -31,7 +31,9 @@ def sent(written, update):
 
 
 def shown(*sequences):
-    """The cells (character, codes of its style) on a terminal that was sent all this, by (row, column)."""
+    """The cells (character, codes of its style) on a terminal that was sent all this, by (row,
+    column).
+    """
     cells, codes, row, column = {}, "", 0, 0
     written = re.sub(r"\x1b\]8;[^\x1b]*\x1b\\\\|\n", "", "".join(sequences))
     for numbers, letter, text in re.findall(r"\x1b\[([0-9;]*)([A-Za-z])|([^\x1b]+)", written):
@@ -106,8 +108,9 @@ def test_textual_draws_what_is_of_an_unknown_kind_or_made_in_another_way():
     assert "left right" in sent(written, known)
 
 
-# The contract with Textual's compositor, which is not public. If a release of Textual breaks it, the workbench still works,
-# since Textual then draws by itself, but it sends more: read `textual/_compositor.py` and mend `terminal/written.py`.
+# The contract with Textual's compositor, which is not public. If a release of Textual breaks it,
+# the workbench still works, since Textual then draws by itself, but it sends more: read
+# `textual/_compositor.py` and mend `terminal/written.py`.
 
 
 @pytest.fixture

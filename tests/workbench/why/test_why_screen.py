@@ -1,4 +1,6 @@
-"""The why view: each model that is left, what happens without it, and the robot's ways with and without it on one map."""
+"""The why view: each model that is left, what happens without it, and the robot's ways with and
+without it on one map.
+"""
 
 import fake_moments
 import fake_run
@@ -293,7 +295,8 @@ async def test_a_number_is_shown_at_its_limits_and_played_beside_what_is_left(ru
             in said
         )
         assert [way.name for way in screen.map.shown.ways] == ["now", "at 0.4"]
-        # A friction moves nothing; a place is outlined where f still shows, where it does not, and where the model cannot be.
+        # A friction moves nothing; a place is outlined where f still shows, where it does not, and
+        # where the model cannot be.
         assert screen.map.shown.limits == ()
         await session.press("down")
         middles = {verdict: ring[:-1, 1].mean() for verdict, ring in screen.map.shown.limits}

@@ -30,7 +30,8 @@ def solid(mesh):
 
 AXES = "".join(f"<param name='{axis}' type='float'/>" for axis in "XYZ")
 SHAPES = (
-    "<triangles count='4'><input semantic='VERTEX' source='#v' offset='1'/><input semantic='NORMAL' source='#n' offset='0'/>"
+    "<triangles count='4'><input semantic='VERTEX' source='#v' offset='1'/><input "
+    "semantic='NORMAL' source='#n' offset='0'/>"
     "<p>0 0 0 2 0 1  0 0 0 1 0 3  0 0 0 3 0 2  0 1 0 2 0 3</p></triangles>"
 )
 

@@ -57,7 +57,10 @@ def test_dae_instances_with_transforms(tmp_path):
     [
         ("<triangles count='2'>{}<p>0 1 2</p><p>0 1 3</p></triangles>", 2),
         (
-            "<triangles count='1'>{}<input semantic='UV' source='#n' offset='1'/><p>0 9 1 9 2 9</p></triangles>",
+            (
+                "<triangles count='1'>{}<input semantic='UV' source='#n' offset='1'/><p>0 9 1 9 2 "
+                "9</p></triangles>"
+            ),
             1,
         ),
         ("<polylist count='2'>{}<vcount>3 4 2</vcount><p>0 1 2 0 1 2 3 0 1</p></polylist>", 3),
@@ -65,7 +68,10 @@ def test_dae_instances_with_transforms(tmp_path):
         ("<tristrips count='1'>{}<p>0 1 2 3</p></tristrips>", 2),
         ("<trifans count='1'>{}<p>0 1 2 3</p></trifans>", 2),
         (
-            "<triangles>{}<p/></triangles><lines>{}<p>0 1</p></lines><triangles>{}<p>0 1 2</p></triangles>",
+            (
+                "<triangles>{}<p/></triangles><lines>{}<p>0 1</p></lines><triangles>{}<p>0 1 "
+                "2</p></triangles>"
+            ),
             1,
         ),
     ],
@@ -76,7 +82,10 @@ def test_dae_primitives(tmp_path, shapes, faces):
 
 
 def test_strip_keeps_its_side(tmp_path):
-    strip = "<tristrips count='1'><input semantic='VERTEX' source='#v' offset='0'/><p>0 1 2 3</p></tristrips>"
+    strip = (
+        "<tristrips count='1'><input semantic='VERTEX' source='#v' offset='0'/><p>0 1 2 "
+        "3</p></tristrips>"
+    )
     mesh = mesh_of(tmp_path / "a.dae", dae(shapes=strip, positions="0 0 0 1 0 0 0 1 0 1 1 0"))
     assert (solid(mesh).face_normals[:, 2] == 1).all()
 

@@ -30,7 +30,9 @@ def surface(solid):
 
 
 def house(width, depth, door):
-    """Four walls of 0.2 m around a room, with a doorway of `door` m in the middle of the front; no roof."""
+    """Four walls of 0.2 m around a room, with a doorway of `door` m in the middle of the front; no
+    roof.
+    """
     inner = Manifold.cube((width - 0.4, depth - 0.4, 3.0)).translate((0.2, 0.2, -0.1))
     way = Manifold.cube((door, 0.4, 2.0)).translate(((width - door) / 2, -0.1, -0.1))
     return Manifold.cube((width, depth, 2.5)) - inner - way

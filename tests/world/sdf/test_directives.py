@@ -1,4 +1,6 @@
-"""Drake's model directives as worlds: where Drake puts each model, what goes with what, and what is refused."""
+"""Drake's model directives as worlds: where Drake puts each model, what goes with what, and what is
+refused.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,4 +1,6 @@
-"""Heightmaps and meshes that are solid ground: where its heights are, what is in the run file, and which images are refused."""
+"""Heightmaps and meshes that are solid ground: where its heights are, what is in the run file, and
+which images are refused.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,10 @@ HEIGHTS = np.array([[0, 40, 80], [0, 100, 200]], dtype=np.uint8)
 
 
 def heightmap(size: str = "4 2 10") -> str:
-    geometry = f"<geometry><heightmap><uri>hill.png</uri><size>{size}</size><pos>1 2 3</pos></heightmap></geometry>"
+    geometry = (
+        f"<geometry><heightmap><uri>hill.png</uri><size>{size}</size><pos>1 2 "
+        "3</pos></heightmap></geometry>"
+    )
     link = f"<collision name='c'>{geometry}</collision><visual name='v'>{geometry}</visual>"
     return f"<model name='hill'><static>true</static><link name='l'>{link}</link></model>"
 
@@ -136,7 +141,10 @@ def hill(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 MESH = "<geometry><mesh><uri>ground.obj</uri>{}</mesh></geometry>"
-GROUND = "<model name='m'><static>true</static><link name='l'><collision name='c'>{}</collision></link></model>"
+GROUND = (
+    "<model name='m'><static>true</static><link name='l'><collision "
+    "name='c'>{}</collision></link></model>"
+)
 
 
 def test_a_mesh_that_is_a_surface_is_solid_ground_below_it(read, tmp_path):

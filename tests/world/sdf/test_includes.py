@@ -47,9 +47,9 @@ def test_of_a_broken_model_config_nothing_but_a_note_is_left(read, table):
     assert [model.name for model in world.models] == ["table", "desk"]
     (note,) = (note for note in world.notes if "model.config" in note.why)
     assert (
-        "line 1, column 36: not well-formed XML: </model> closes <sdf> of line 1; model.sdf is taken"
-        in note.why
-    )
+        "line 1, column 36: not well-formed XML: </model> closes <sdf> of line 1; model.sdf is "
+        "taken"
+    ) in note.why
     # What a run file stores says it, too.
     again = parse_world(world.text, world.path, resources=Resources(world.resources))
     assert again.notes == world.notes
@@ -96,7 +96,10 @@ def test_the_place_of_an_include_can_be_that_of_a_frame_inside(read, table, of_m
 def test_models_in_models_become_one(read, table):
     inner = f"<model name='in'><pose>0 0 1 0 0 0</pose><link name='l'>{BOX}</link></model>"
     world = read(
-        f"<model name='m'><static>1</static><pose>1 0 0 0 0 0</pose>{inner}{included('<name>t</name>')}</model>",
+        (
+            "<model name='m'><static>1</static><pose>1 0 0 0 0 "
+            f"0</pose>{inner}{included('<name>t</name>')}</model>"
+        ),
         model_path=(table,),
     )
     links = {link.name: link.pose.position for link in world.models[0].links}
@@ -113,8 +116,14 @@ def test_a_static_model_in_one_that_moves_hangs_on_the_world(read):
     "inside",
     [
         f"<model name='in'><static>1</static><link name='l'>{BOX}</link></model>",
-        f"<model name='in'><static>1</static><model name='inner'><link name='l'>{BOX}</link></model></model>",
-        f"<link name='l'>{BOX}</link><joint name='j' type='fixed'><parent>world</parent><child>l</child></joint>",
+        (
+            "<model name='in'><static>1</static><model name='inner'><link "
+            f"name='l'>{BOX}</link></model></model>"
+        ),
+        (
+            f"<link name='l'>{BOX}</link><joint name='j' "
+            "type='fixed'><parent>world</parent><child>l</child></joint>"
+        ),
     ],
 )
 def test_a_model_that_is_fixed_to_the_world_is_static(read, inside):
@@ -134,7 +143,10 @@ def test_the_parts_of_a_static_model_in_another_one_can_be_removed(read):
 
 
 def test_the_links_of_a_merged_model_are_those_of_the_model_around_it(read, table):
-    inner = f"<frame name='tip'><pose>0 0 2 0 0 0</pose></frame><link name='a'>{BOX}</link><link name='b'>{BOX}</link>"
+    inner = (
+        f"<frame name='tip'><pose>0 0 2 0 0 0</pose></frame><link name='a'>{BOX}</link><link "
+        f"name='b'>{BOX}</link>"
+    )
     (table / "table" / "model.sdf").write_text(
         f"<sdf version='1.9'><model name='table'><static>1</static>{inner}</model></sdf>"
     )
@@ -245,7 +257,10 @@ def test_gravity_of_old_and_new_files(read):
 
 
 def test_all_files_that_are_nowhere_are_told_at_once(read):
-    mesh = "<collision name='c'><geometry><mesh><uri>model://lamp/lamp.dae</uri></mesh></geometry></collision>"
+    mesh = (
+        "<collision "
+        "name='c'><geometry><mesh><uri>model://lamp/lamp.dae</uri></mesh></geometry></collision>"
+    )
     with pytest.raises(
         UserError,
         match=r"'model://table' was not found: .*; also missing: 'model://lamp/lamp.dae'$",
@@ -279,17 +294,30 @@ SILENT = {
     "a misspelt limit": "<joint name='j' type='revolute'>{ends}<axis><xyz>0 0 1</xyz><limits/></axis></joint>",
     "a limit outside its axis": "<joint name='j' type='fixed'>{ends}<limit/></joint>",
     "two axes": "<joint name='j' type='revolute'>{ends}<axis/><axis/></joint>",
-    "a spring": "<joint name='j' type='revolute'>{ends}<axis><dynamics><spring_stiffness>9</spring_stiffness></dynamics>"
+    "a spring": "<joint name='j' "
+    "type='revolute'>{ends}<axis><dynamics><spring_stiffness>9</spring_stiffness></dynamics>"
     "</axis></joint>",
-    "dry friction": "<joint name='j' type='revolute'>{ends}<axis><dynamics><friction>9</friction></dynamics></axis></joint>",
-    "limits that are not simulated": "<joint name='j' type='continuous'>{ends}<axis><limit><lower>0</lower></limit></axis></joint>",
+    "dry friction": (
+        "<joint name='j' "
+        "type='revolute'>{ends}<axis><dynamics><friction>9</friction></dynamics></axis></joint>"
+    ),
+    "limits that are not simulated": (
+        "<joint name='j' "
+        "type='continuous'>{ends}<axis><limit><lower>0</lower></limit></axis></joint>"
+    ),
     "a joint's sensor": "<joint name='j' type='fixed'>{ends}<sensor name='s'/></joint>",
     "drag": "<velocity_decay><linear>0.1</linear></velocity_decay>",
     "a misspelt mass": "<inertial><Mass>5</Mass></inertial>",
-    "misplaced friction": "<collision name='c'>{box}<surface><friction><mu>0.1</mu></friction></surface></collision>",
-    "bounce": "<collision name='c'>{box}<surface><bounce><restitution_coefficient>1</restitution_coefficient></bounce></surface>"
+    "misplaced friction": (
+        "<collision name='c'>{box}<surface><friction><mu>0.1</mu></friction></surface></collision>"
+    ),
+    "bounce": "<collision "
+    "name='c'>{box}<surface><bounce><restitution_coefficient>1</restitution_coefficient></bounce></surface>"
     "</collision>",
-    "a bitmask": "<collision name='c'>{box}<surface><contact><collide_bitmask>2</collide_bitmask></contact></surface></collision>",
+    "a bitmask": (
+        "<collision "
+        "name='c'>{box}<surface><contact><collide_bitmask>2</collide_bitmask></contact></surface></collision>"
+    ),
 }
 
 

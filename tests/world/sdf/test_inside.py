@@ -1,4 +1,6 @@
-"""Inside models: their collisions as models that can be removed, and the text without some of them."""
+"""Inside models: their collisions as models that can be removed, and the text without some of
+them.
+"""
 
 import pytest
 import trimesh
@@ -103,9 +105,15 @@ def test_a_model_whose_parts_would_have_one_name_stays_whole_and_is_noted(read, 
 
 
 def test_what_moves_and_what_others_are_placed_relative_to_stays_whole_and_is_noted(read):
-    cart = f"<model name='cart'><link name='l'>{shape('collision', 'a')}{shape('collision', 'b')}</link></model>"
+    cart = (
+        "<model name='cart'><link "
+        f"name='l'>{shape('collision', 'a')}{shape('collision', 'b')}</link></model>"
+    )
     base = house(ROOMS).replace("house", "base")
-    lamp = f"<model name='lamp'><pose relative_to='base'/><static>1</static><link name='l'>{shape('collision', 'd')}</link></model>"
+    lamp = (
+        "<model name='lamp'><pose relative_to='base'/><static>1</static><link "
+        f"name='l'>{shape('collision', 'd')}</link></model>"
+    )
     world = read(f"{cart}{base}{lamp}{house(ROOMS)}", inside=True)
     assert world.elements()[:2] == ("cart", "lamp")
     whole = {note.model: note.why for note in world.notes if note.what == "--inside"}
@@ -115,14 +123,22 @@ def test_what_moves_and_what_others_are_placed_relative_to_stays_whole_and_is_no
 
 @pytest.fixture
 def models(tmp_path):
-    """A folder of models: a hut with a mesh, which includes a porch, and a shed that is a URDF file."""
+    """A folder of models: a hut with a mesh, which includes a porch, and a shed that is a URDF
+    file.
+    """
     for name in ("hut", "porch", "shed"):
         (tmp_path / "models" / name / "meshes").mkdir(parents=True)
     trimesh.creation.box((1, 1, 1)).export(tmp_path / "models" / "hut" / "meshes" / "a&b.obj")
-    mesh = "<collision name='m'><geometry><mesh><uri>meshes/a&amp;b.obj</uri></mesh></geometry></collision>"
+    mesh = (
+        "<collision "
+        "name='m'><geometry><mesh><uri>meshes/a&amp;b.obj</uri></mesh></geometry></collision>"
+    )
     porch = "<include><uri>model://porch</uri><pose relative_to='door'>0 0 1 0 0 0</pose></include>"
     door = "<frame name='door'><pose>3 0 0 0 0 0</pose></frame>"
-    hut = f"<sdf version='1.7'>\n<model name='hut' canonical_link='walls'><pose>7 7 7 0 0 0</pose>{door}{ROOMS}"
+    hut = (
+        "<sdf version='1.7'>\n<model name='hut' canonical_link='walls'><pose>7 7 7 0 0 "
+        f"0</pose>{door}{ROOMS}"
+    )
     hut += f"<link name='chimney'>{mesh}</link>{porch}</model>\n</sdf>"
     (tmp_path / "models" / "hut" / "model.sdf").write_text(hut)
     post = "<link name='post'>" + shape("collision", "p") + shape("collision", "q") + "</link>"

@@ -16,7 +16,10 @@ from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Sphere
 from ddenv.world.sdf.inertia import solid
 
 MASS = "<inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>"
-LINKS = f"<link name='a'>{MASS}</link><link name='b'><pose>0 0 1 0 0 0</pose>{MASS}</link><link name='c'>{MASS}</link>"
+LINKS = (
+    f"<link name='a'>{MASS}</link><link name='b'><pose>0 0 1 0 0 0</pose>{MASS}</link><link "
+    f"name='c'>{MASS}</link>"
+)
 
 
 def joint(kind, inside="<axis><xyz>0 0 2</xyz></axis>", parent="a", child="b", name="j"):
@@ -42,7 +45,10 @@ def test_a_joint_without_an_axis_turns_about_its_own_z(read):
 
 @pytest.mark.parametrize(("offset", "kind", "mu"), [(0.0, "fixed", 0.0), (0.01, "ball", 1.0)])
 def test_a_caster_ball_slides_in_place_of_rolling(read, offset, kind, mu):
-    ball = f"<collision name='s'><pose>{offset} 0 0 0 0 0</pose><geometry><sphere><radius>0.1</radius></sphere></geometry>"
+    ball = (
+        f"<collision name='s'><pose>{offset} 0 0 0 0 "
+        "0</pose><geometry><sphere><radius>0.1</radius></sphere></geometry>"
+    )
     links = LINKS.replace("<link name='b'>", f"<link name='b'>{ball}</collision>")
     world = read(f"<model name='m'>{links}{joint('ball')}</model>")
     (model,) = world.models
@@ -119,7 +125,10 @@ def test_a_hull_has_the_inertia_of_what_it_holds():
 
 
 def moving(inertial, tag="model"):
-    shape = "<collision name='c'><pose>0 0 1 0 0 0</pose><geometry><box><size>1 2 3</size></box></geometry></collision>"
+    shape = (
+        "<collision name='c'><pose>0 0 1 0 0 0</pose><geometry><box><size>1 2 "
+        "3</size></box></geometry></collision>"
+    )
     return (
         f"<{tag} name='m'><link name='l'><pose>4 0 0 0 0 0</pose>{inertial}{shape}</link></{tag}>"
     )
@@ -162,7 +171,10 @@ def test_automatic_inertia_uses_the_density_or_spreads_a_mass(read, given, mass)
 
 
 def test_two_shapes_share_one_inertia(read):
-    half = "<collision name='{0}'><pose>{1} 0 0 0 0 0</pose><geometry><box><size>1 1 1</size></box></geometry></collision>"
+    half = (
+        "<collision name='{0}'><pose>{1} 0 0 0 0 0</pose><geometry><box><size>1 1 "
+        "1</size></box></geometry></collision>"
+    )
     link = f"<link name='l'>{half.format('a', -0.5)}{half.format('b', 0.5)}</link>"
     inertia = read(f"<model name='m'>{link}</model>").models[0].links[0].inertia
     assert inertia.moments == pytest.approx((1 / 6, 5 / 12, 5 / 12))
@@ -178,8 +190,14 @@ def test_two_shapes_share_one_inertia(read):
     ],
 )
 def test_a_joint_that_was_saved_beyond_half_a_turn_is_within_its_limits(read, limits, angle, left):
-    limit = f"<axis><xyz>0 0 1</xyz><limit><lower>{limits[0]}</lower><upper>{limits[1]}</upper></limit></axis>"
-    state = f"<state><model name='m'><link name='b'><pose>0 0 1 0 0 {angle}</pose></link></model></state>"
+    limit = (
+        "<axis><xyz>0 0 "
+        f"1</xyz><limit><lower>{limits[0]}</lower><upper>{limits[1]}</upper></limit></axis>"
+    )
+    state = (
+        "<state><model name='m'><link name='b'><pose>0 0 1 0 0 "
+        f"{angle}</pose></link></model></state>"
+    )
     (one,) = (
         read(f"<model name='m'>{LINKS}{joint('revolute', limit)}</model>{state}", "1.6")
         .models[0]

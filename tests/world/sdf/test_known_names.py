@@ -1,4 +1,6 @@
-"""Models that most Gazebo worlds name are there on every machine, and what is missing can be guessed."""
+"""Models that most Gazebo worlds name are there on every machine, and what is missing can be
+guessed.
+"""
 
 import pytest
 
@@ -91,7 +93,10 @@ def test_a_mesh_that_is_scaled_has_its_known_size_scaled(read):
 
 
 def test_auto_prefers_the_box_around_the_visuals(read):
-    visual = "<visual name='v'><pose>0 0 1 0 0 0</pose><geometry><box><size>1 2 3</size></box></geometry></visual>"
+    visual = (
+        "<visual name='v'><pose>0 0 1 0 0 0</pose><geometry><box><size>1 2 "
+        "3</size></box></geometry></visual>"
+    )
     world = read(lost("model://table/x.dae", inside=visual), stand_ins={"*": "auto"})
     collision, note = guessed(world)
     assert (collision.shape, collision.pose.position) == (Box((1, 2, 3)), (0, 0, 1))
@@ -100,7 +105,10 @@ def test_auto_prefers_the_box_around_the_visuals(read):
 
 def test_auto_takes_the_box_that_has_the_inertia(read):
     moments = "<ixx>0.0011</ixx><iyy>0.1771</iyy><izz>0.1763</izz>"
-    inertial = f"<inertial><pose>0 0 0.2 0 0 0</pose><mass>1.4111</mass><inertia>{moments}</inertia></inertial>"
+    inertial = (
+        "<inertial><pose>0 0 0.2 0 0 "
+        f"0</pose><mass>1.4111</mass><inertia>{moments}</inertia></inertial>"
+    )
     text = lost("model://plank/x.dae", inside=inertial, pose="<pose>5 0 0 0 0 0</pose>", static=0)
     collision, note = guessed(read(text, stand_ins={"*": "auto"}))
     assert collision.shape.size == pytest.approx((1.2192, 0.038, 0.0888), rel=0.1)
@@ -166,7 +174,10 @@ def test_one_uri_can_be_guessed_and_another_left_out(read):
     text = included("model://table") + included("model://odd") + lost("model://gone/x.dae")
     with pytest.raises(
         UserError,
-        match=r"'model://table'.*--stand-in auto.*; also missing: 'model://odd', 'model://gone/x.dae'",
+        match=(
+            r"'model://table'.*--stand-in auto.*; also missing: 'model://odd', "
+            r"'model://gone/x.dae'"
+        ),
     ):
         read(text)
     world = read(text, stand_ins={"*": "auto", "model://odd": "none", "model://gone": "none"})

@@ -1,4 +1,6 @@
-"""A world is written with other poses; every other byte stays, and what is written reads as it was asked for."""
+"""A world is written with other poses; every other byte stays, and what is written reads as it was
+asked for.
+"""
 
 import re
 
@@ -19,7 +21,8 @@ INERTIAL = (
 LINK = f"<link name='link'>{INERTIAL}{BOX}</link>"
 HINGE = (
     f"<link name='arm'><pose>0 0 1 0 0 0</pose>{INERTIAL}{BOX}</link>"
-    "<joint name='hinge' type='revolute'><parent>link</parent><child>arm</child><axis><xyz>1 0 0</xyz></axis></joint>"
+    "<joint name='hinge' type='revolute'><parent>link</parent><child>arm</child><axis><xyz>1 0 "
+    "0</xyz></axis></joint>"
 )
 WORLD = f"""<?xml version='1.0'?>
 <sdf version='1.9'><world name='w'>

@@ -1,4 +1,6 @@
-"""The numbers of a world: each may be changed in its own text, all other bytes stay, and what cannot be is said."""
+"""The numbers of a world: each may be changed in its own text, all other bytes stay, and what
+cannot be is said.
+"""
 
 import dataclasses
 
@@ -62,7 +64,8 @@ def test_each_number_of_a_world_can_be_changed_and_read_again(parts):
         assert differ == [name]
         assert abs(found[name].now - value) < 1e-6 * max(1.0, abs(value))
         if there == scenario:
-            # Every element keeps its place in the text: only words changed, or a friction is said that was not.
+            # Every element keeps its place in the text: only words changed, or a friction is said
+            # that was not.
             assert abs(len(after.text) - len(world.text)) < 90
             assert after.text[:40] == world.text[:40]
 

@@ -1,4 +1,6 @@
-"""What the official SDF checker says of our files and of those that we write, and what we foretell of it."""
+"""What the official SDF checker says of our files and of those that we write, and what we foretell
+of it.
+"""
 
 import os
 import random
@@ -38,7 +40,9 @@ MEMORY = 3 << 30
 
 
 def complaints(path, model_path=()):
-    """What the official checker finds wrong with a file: how often each line. Skips where it needs too much memory."""
+    """What the official checker finds wrong with a file: how often each line. Skips where it needs
+    too much memory.
+    """
     said = subprocess.run(
         ["ign", "sdf", "-k", path],
         capture_output=True,
@@ -165,7 +169,9 @@ def test_converted_and_minimal_worlds_are_valid(path, official, tmp_path):
 
 
 def generated(dice):
-    """A world of boxes, frames, joints, nested models and lights; in two of three worlds some have odd names or moments."""
+    """A world of boxes, frames, joints, nested models and lights; in two of three worlds some have
+    odd names or moments.
+    """
     odd, impossible = dice.choice(
         [([], 0), (["same", "same", "__odd__", "x::y"], 0), (["same"], 1)]
     )
@@ -201,7 +207,10 @@ def generated(dice):
             else ""
         )
         static = dice.randrange(2)
-        return f"<model name='{own}'><static>{static}</static><pose{place}>1 0 0 0 0 0</pose>{link('l')}{more}{inner}</model>"
+        return (
+            f"<model name='{own}'><static>{static}</static><pose{place}>1 0 0 0 0 "
+            f"0</pose>{link('l')}{more}{inner}</model>"
+        )
 
     names, inside = [], []
     for number in range(8):
@@ -209,10 +218,14 @@ def generated(dice):
         names.append(f"model_{number}")
     inside.append(f"<model name='{name('model')}'><static>1</static><link name='l'/></model>")
     inside.append(
-        f"<light name='{name('light')}' type='point'><pose relative_to='model_7'>0 0 1 0 0 0</pose></light>"
+        f"<light name='{name('light')}' type='point'><pose relative_to='model_7'>0 0 1 0 0 "
+        "0</pose></light>"
     )
     inside.append(f"<frame name='marked' attached_to='{dice.choice(names)}'/>")
-    text = f"<sdf version='{dice.choice(['1.7', '1.8', '1.9'])}'><world name='w'>{''.join(inside)}</world></sdf>"
+    text = (
+        f"<sdf version='{dice.choice(['1.7', '1.8', '1.9'])}'><world "
+        f"name='w'>{''.join(inside)}</world></sdf>"
+    )
     return text.encode()
 
 
@@ -228,7 +241,8 @@ def test_generated_worlds_are_judged_as_foretold(official, tmp_path):
             said = official(each.text)
             assert bool(said) == bool(refused(each)), (seed, said, refused(each))
         valid += not refused(world)
-        # The checker names only the first mistakes, so those of the smaller world are counted by what we foretell.
+        # The checker names only the first mistakes, so those of the smaller world are counted by
+        # what we foretell.
         assert Counter(why for why, _ in refused(smaller)) <= Counter(
             why for why, _ in refused(world)
         ), seed
@@ -375,7 +389,8 @@ WITH_A_WORLD = [
 def test_public_worlds_are_judged_as_by_the_checker(path, official):
     if path is None:
         pytest.skip(
-            "needs the folders repros/worlds and worlds/public/gz_examples in a folder shared beside the checkout"
+            "needs the folders repros/worlds and worlds/public/gz_examples in a folder shared "
+            "beside the checkout"
         )
     model_path = [path.parent / "models"] if (path.parent / "models").is_dir() else []
     wrong = complaints(path, model_path)

@@ -1,4 +1,6 @@
-"""The copies that a `<population>` makes of its model. The places were worked out by hand from gazebo-classic's Population.cc."""
+"""The copies that a `<population>` makes of its model. The places were worked out by hand from
+gazebo-classic's Population.cc.
+"""
 
 import math
 
@@ -16,8 +18,14 @@ QUARTER = math.pi / 2
 
 
 def population(distribution: str, more: str, static: bool = True) -> str:
-    model = f"<model name='can'><pose>7 7 7 0 0 0</pose><static>{static}</static><link name='l'>{BOX}</link></model>"
-    return f"<population name='p'>{model}{more}<distribution>{distribution}</distribution></population>"
+    model = (
+        f"<model name='can'><pose>7 7 7 0 0 0</pose><static>{static}</static><link "
+        f"name='l'>{BOX}</link></model>"
+    )
+    return (
+        "<population "
+        f"name='p'>{model}{more}<distribution>{distribution}</distribution></population>"
+    )
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,9 @@ def test_polylines_stand_on_their_frame_with_their_notches_and_holes(read, outli
 
 @pytest.fixture
 def angle(tmp_path):
-    """An L of 1 m width and height, as a mesh that is mirrored and stretched downwards: collision and visual of a link."""
+    """An L of 1 m width and height, as a mesh that is mirrored and stretched downwards: collision
+    and visual of a link.
+    """
     outline = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]])
     _extruded(outline, 1.0).export(tmp_path / "angle.obj")
 
@@ -142,7 +144,8 @@ def test_meshes_are_convex_pieces_where_they_collide_and_themselves_where_they_a
         ),
         # What a joint turns rolls on its hull.
         lambda angle: (
-            f"{angle()}<link name='k'/><joint name='j' type='continuous'><parent>k</parent><child>l</child>"
+            f"{angle()}<link name='k'/><joint name='j' "
+            "type='continuous'><parent>k</parent><child>l</child>"
             "<axis><xyz>0 0 1</xyz></axis></joint>",
             {},
         ),
@@ -204,7 +207,10 @@ def test_a_stand_in_stands_on_the_frame_of_what_it_replaces(read):
 @pytest.mark.parametrize("kind", ["visual", "collision"])
 def test_the_box_around_the_other_shapes_of_a_link_can_stand_in(read, kind):
     pose = "<pose>0 0 1 0 0 0</pose>"
-    other = f"<{kind} name='o'>{pose}<geometry><cylinder><radius>0.5</radius><length>2</length></cylinder></geometry></{kind}>"
+    other = (
+        f"<{kind} "
+        f"name='o'>{pose}<geometry><cylinder><radius>0.5</radius><length>2</length></cylinder></geometry></{kind}>"
+    )
     lost = (
         f"<collision name='c'>{pose}<geometry><mesh><uri>a.dae</uri></mesh></geometry></collision>"
     )

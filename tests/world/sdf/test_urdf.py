@@ -12,8 +12,14 @@ from ddenv.world.scenario import Reading
 from ddenv.world.sdf.read import parse_model, read_model
 
 HERE = Path("robot.urdf")
-BODY = '<inertial><origin xyz="0 0 0.1"/><mass value="5"/><inertia ixx="1" iyy="2" izz="2" ixy="0.1" ixz="0" iyz="0"/></inertial>'
-WHEEL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+BODY = (
+    '<inertial><origin xyz="0 0 0.1"/><mass value="5"/><inertia ixx="1" iyy="2" izz="2" '
+    'ixy="0.1" ixz="0" iyz="0"/></inertial>'
+)
+WHEEL = (
+    '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" '
+    'iyz="0"/></inertial>'
+)
 
 
 def urdf(*parts: str) -> bytes:
@@ -25,7 +31,10 @@ def link(name: str, inside: str = "") -> str:
 
 
 def joint(name: str, kind: str, parent: str, child: str, inside: str = "") -> str:
-    return f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>{inside}</joint>\n'
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child '
+        f'link="{child}"/>{inside}</joint>\n'
+    )
 
 
 def shape(text: str) -> str:
@@ -89,12 +98,18 @@ def test_shapes_with_the_friction_of_gazebo_elements():
         '<sphere radius="0.5"/>',
         '<capsule radius="0.5" length="2"/>',
     )
-    collision = '<collision name="round"><origin xyz="0 0 1"/><geometry><sphere radius="1"/></geometry></collision>'
+    collision = (
+        '<collision name="round"><origin xyz="0 0 1"/><geometry><sphere '
+        'radius="1"/></geometry></collision>'
+    )
     model = read(
         link("base", BODY + "".join(map(shape, shapes)) + collision),
         link("wheel", WHEEL + shape(shapes[1])),
         joint("roll", "continuous", "base", "wheel"),
-        '<gazebo reference="wheel"><mu1>0.7</mu1><mu2 value="0.9"/><material>Gazebo/Blue</material></gazebo>',
+        (
+            '<gazebo reference="wheel"><mu1>0.7</mu1><mu2 '
+            'value="0.9"/><material>Gazebo/Blue</material></gazebo>'
+        ),
         '<gazebo><plugin name="drive" filename="libdrive.so"/></gazebo><transmission name="t"/>',
     )
     found = model.links[0].collisions
@@ -115,7 +130,10 @@ def test_the_friction_of_drake_is_that_of_its_collision():
 
 
 def test_limits_effort_and_damping():
-    limit = '<limit lower="-1" upper="2" effort="3" velocity="4"/><dynamics damping="0.5" friction="1"/>'
+    limit = (
+        '<limit lower="-1" upper="2" effort="3" velocity="4"/><dynamics damping="0.5" '
+        'friction="1"/>'
+    )
     model = read(
         *(link(name, WHEEL) for name in "abcd"),
         joint("slide", "prismatic", "a", "b", limit),
@@ -173,7 +191,10 @@ def test_a_mesh_that_is_nowhere_may_be_stood_in_for():
     base = link("base", BODY + shape('<mesh filename="package://cart/wheel.dae"/>'))
     with pytest.raises(
         UserError,
-        match=r"robot.urdf:3: /robot\[@name='cart'\]/link.*'package://cart/wheel.dae' is not available",
+        match=(
+            r"robot.urdf:3: /robot\[@name='cart'\]/link.*'package://cart/wheel.dae' is not "
+            r"available"
+        ),
     ):
         read(base)
     model = read(base, reading=Reading(stand_ins={"package://cart": "cylinder:0.3,1.0"}))

@@ -1,5 +1,5 @@
-"""Makes tests on the workers of a Dask cluster, as `Pool` does in processes here. A worker gets tests once its first run of the
-whole world has the bits that it has here.
+"""Makes tests on the workers of a Dask cluster, as `Pool` does in processes here. A worker gets
+tests once its first run of the whole world has the bits that it has here.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from ddenv.world.scenario import Scenario, seed_of
 
 # The number of the test made here to compare with.
 REFERENCE = 0
-# The maximum time until a result that is there has come, s. A client that is closed meanwhile would never bring it, and its thread
-# would keep the engine from ending.
+# The maximum time until a result that is there has come, s. A client that is closed meanwhile would
+# never bring it, and its thread would keep the engine from ending.
 FETCHED = 20.0
 # The time between two looks at who is there, and between two attempts to connect, s.
 PERIOD = 0.5
@@ -49,10 +49,11 @@ GOODBYE = 2.0
 
 
 class Link:
-    """The connection to the scheduler of `cluster`, in a thread of its own; it is made again when it is lost.
+    """The connection to the scheduler of `cluster`, in a thread of its own; it is made again when
+    it is lost.
 
-    It calls `attached` with each new connection, `there` with the addresses of all workers and how many tests each can make at a
-    time, and `lost` with the reason.
+    It calls `attached` with each new connection, `there` with the addresses of all workers and how
+    many tests each can make at a time, and `lost` with the reason.
     """
 
     def __init__(
@@ -75,7 +76,8 @@ class Link:
         except Exception as error:
             self._end()
             raise UserError(
-                f"{cluster}: no Dask scheduler can be used there ({reason_of(error)}); start it, or run the tests on this "
+                f"{cluster}: no Dask scheduler can be used there ({reason_of(error)}); start it, "
+                "or run the tests on this "
                 "machine with --cluster here"
             ) from None
         self._thread = threading.Thread(target=self._follow, daemon=True)
@@ -113,7 +115,9 @@ class Link:
                 self._end()
 
     def _watch(self, client: Client) -> str:
-        """Tells who is there, as often as that changes, until the scheduler is lost; returns why."""
+        """Tells who is there, as often as that changes, until the scheduler is lost; returns
+        why.
+        """
         before = None
         comm = client.scheduler_comm
         while not self._closed.wait(PERIOD):
@@ -148,8 +152,9 @@ class Link:
 
 @dataclass(eq=False, kw_only=True)
 class _Worker:
-    """A Dask worker that can make `threads` tests at a time; `accepted` once it has shown the same bits. `hello` is None until it
-    has answered. `asked` has by key what it does now, None for a hello; the scheduler drops it with its future.
+    """A Dask worker that can make `threads` tests at a time; `accepted` once it has shown the same
+    bits. `hello` is None until it has answered. `asked` has by key what it does now, None for a
+    hello; the scheduler drops it with its future.
     """
 
     address: str
@@ -170,7 +175,9 @@ class _Worker:
 
 
 class ClusterPool:
-    """The workers of the `cluster` of a scenario, and one process here while something is made to compare with."""
+    """The workers of the `cluster` of a scenario, and one process here while something is made to
+    compare with.
+    """
 
     def __init__(
         self,
@@ -180,8 +187,9 @@ class ClusterPool:
         cluster: str,
         tell: Callable[[int, str], None],
     ) -> None:
-        """Calls `tell` with the number of tests that the cluster can run at the same time, and a sentence. Raises UserError if no
-        scheduler answers, or where Drake is needed and not installed.
+        """Calls `tell` with the number of tests that the cluster can run at the same time, and a
+        sentence. Raises UserError if no scheduler answers, or where Drake is needed and not
+        installed.
         """
         self._cluster = cluster
         self._tell = tell
@@ -202,7 +210,8 @@ class ClusterPool:
         self._said = 0
         self._client: Client | None = None
         self._sent: Future[bytes] | None = None
-        # The process here that makes the run to compare with; runs of the user's own simulator are not compared.
+        # The process here that makes the run to compare with; runs of the user's own simulator are
+        # not compared.
         self._home = Pool(*self._parts, 1) if scenario.oracle is None else None
         self._reference: RunResult | None = None
         # What has happened in other threads, to be done in that of the engine.
@@ -369,7 +378,9 @@ class ClusterPool:
         future.add_done_callback(answer)
 
     def _ended(self, worker: _Worker, key: str, answer: Any) -> None:
-        """A result, a hello with a run, or an exception came back. Raises UserError if the world cannot be simulated."""
+        """A result, a hello with a run, or an exception came back. Raises UserError if the world
+        cannot be simulated.
+        """
         if key not in worker.asked:
             # The worker was lost, and the test is made elsewhere.
             return
@@ -456,7 +467,8 @@ class ClusterPool:
 
 
 def refusal(hello: Hello, there: Result | None, here: RunResult | None) -> str:
-    """Why a worker is left out whose first run of the whole world is `there`; "" if it may make tests.
+    """Why a worker is left out whose first run of the whole world is `there`; "" if it may make
+    tests.
 
     Without a run `here` to compare with, only the version of ddenv counts.
     """
@@ -477,5 +489,8 @@ def refusal(hello: Hello, there: Result | None, here: RunResult | None) -> str:
     if not same:
         theirs = f"{hello.simulator}, {hello.machine}"
         mine = f"{simulator()}, {machine()}"
-        return f"its first run of the whole world has different bits; it has {theirs}; this machine has {mine}"
+        return (
+            f"its first run of the whole world has different bits; it has {theirs}; this machine "
+            f"has {mine}"
+        )
     return ""

@@ -1,4 +1,6 @@
-"""What runs inside a Dask worker: each test in a child process that keeps the simulator: Dask cannot end what hangs."""
+"""What runs inside a Dask worker: each test in a child process that keeps the simulator: Dask
+cannot end what hangs.
+"""
 
 from __future__ import annotations
 
@@ -54,8 +56,8 @@ class NotWanted(Exception):
 
 
 def greet(parts: bytes, asked: Asked) -> tuple[Hello, Result | None]:
-    """A worker's hello, and the test by which its bits are compared; none in a simulator of the user's own. Raises UserError where
-    that cannot be started.
+    """A worker's hello, and the test by which its bits are compared; none in a simulator of the
+    user's own. Raises UserError where that cannot be started.
     """
     hello = Hello(platform.node(), __version__, simulator(), machine())
     # The name of the run begins with the engine's version: another one may understand nothing else.
@@ -69,7 +71,9 @@ def greet(parts: bytes, asked: Asked) -> tuple[Hello, Result | None]:
 
 
 def make(parts: bytes, asked: Asked) -> Result:
-    """Makes a test in a child process. Raises UserError if the world cannot be simulated, and NotWanted."""
+    """Makes a test in a child process. Raises UserError if the world cannot be simulated, and
+    NotWanted.
+    """
     worker = get_worker()
     key = worker.get_current_task()
     with _child(parts, asked.run) as child:
@@ -111,7 +115,8 @@ def _child(parts: bytes, run: str) -> Iterator[Pool]:
         if kept is not None:
             # A worker has memory for one a thread.
             kept[1].close()
-        # Dask's nanny starts workers as daemons, which may have no children. Ours follow their parent's end by themselves.
+        # Dask's nanny starts workers as daemons, which may have no children. Ours follow their
+        # parent's end by themselves.
         multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # there is no public way
         known: Parts = pickle.loads(parts)
         child = Pool(*known, 1, at_a_time=get_worker().state.nthreads)

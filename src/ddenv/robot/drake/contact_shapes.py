@@ -1,9 +1,10 @@
 """The boxes and spheres that stand for a collision, so that contacts are right at edges.
 
-Drake computes the contact of a sphere with a box, and that of two boxes, exactly. Nearly all other pairs go through a general
-solver that is wrong at edges: there its normal is the line between the centres of the two shapes, so that a cylinder which rolls
-over a lip of 1 mm hits a wall, and the longer the slab behind the lip, the steeper that wall. `benchmarks/contact_normals.py`
-measures each pair. docs/contact.md says what stands for what.
+Drake computes the contact of a sphere with a box, and that of two boxes, exactly. Nearly all other
+pairs go through a general solver that is wrong at edges: there its normal is the line between the
+centres of the two shapes, so that a cylinder which rolls over a lip of 1 mm hits a wall, and the
+longer the slab behind the lip, the steeper that wall. `benchmarks/contact_normals.py` measures each
+pair. docs/contact.md says what stands for what.
 """
 
 from __future__ import annotations
@@ -38,7 +39,9 @@ from ddenv.world.pose import HERE, Pose, Vector, pointing, vector
 
 
 class Placed(NamedTuple):
-    """A shape at its `pose`, and which shapes can touch it: all, only spheres, or all but spheres."""
+    """A shape at its `pose`, and which shapes can touch it: all, only spheres, or all but
+    spheres.
+    """
 
     shape: Shape
     pose: Pose
@@ -47,15 +50,18 @@ class Placed(NamedTuple):
 
 Kind = Literal["static", "robot", "loose"]
 
-# How far a wheel may rise and fall as it rolls from sphere to sphere on a plane: this many m, and this share of its radius.
+# How far a wheel may rise and fall as it rolls from sphere to sphere on a plane: this many m, and
+# this share of its radius.
 BUMP = 1e-3
 BUMP_SHARE = 6e-3
 # How far an edge may sink in between two spheres of a wheel, as a share of the wheel's radius.
 DIP_SHARE = 0.012
-# The spheres of a thin wheel have this share of its radius: smaller ones would leave gaps between them.
+# The spheres of a thin wheel have this share of its radius: smaller ones would leave gaps between
+# them.
 THINNEST = 1 / 12
 MOST_SPHERES = 96  # of one ring
-# How far the sides of a prism of boxes may lie from the cylinder that it stands for, m, and the number of its sides.
+# How far the sides of a prism of boxes may lie from the cylinder that it stands for, m, and the
+# number of its sides.
 FLAT = 5e-3
 FEWEST_SIDES = 16
 MOST_SIDES = 96
@@ -63,7 +69,8 @@ FINE_SIDES = 32  # of a prism that is a single shape
 
 
 def contact_shapes(model: Model, link: Link, robot: bool) -> list[list[Placed]]:
-    """For each collision of a `link` what stands for it; the poses are in the world, as the model starts.
+    """For each collision of a `link` what stands for it; the poses are in the world, as the model
+    starts.
 
     With `robot` the model is the robot, no part of which rolls except its wheels.
     """
@@ -123,8 +130,9 @@ def _piece(shape: Shape, pose: Pose, kind: Kind) -> list[Placed]:
 def cylinder(radius: float, length: float, kind: Kind) -> list[Placed]:
     """What stands for a cylinder along z.
 
-    A sphere touches a cylinder exactly, and a box a prism nearly so: of what is static each sees its own. What moves must touch
-    boxes of any length exactly, so it is made of boxes; between the edges of what rolls, spheres as wide as it touch the ground.
+    A sphere touches a cylinder exactly, and a box a prism nearly so: of what is static each sees
+    its own. What moves must touch boxes of any length exactly, so it is made of boxes; between the
+    edges of what rolls, spheres as wide as it touch the ground.
     """
     if kind == "static":
         return [
@@ -147,7 +155,9 @@ def _fine_prism(radius: float, length: float) -> Mesh:
 
 
 def _mean_outer(radius: float, sides: int) -> float:
-    """The radius on which the corners of a prism lie whose sides are as far outside a cylinder as inside."""
+    """The radius on which the corners of a prism lie whose sides are as far outside a cylinder as
+    inside.
+    """
     angle = math.pi / sides
     return radius * angle / math.sin(angle)
 
@@ -155,8 +165,9 @@ def _mean_outer(radius: float, sides: int) -> float:
 def prism(radius: float, length: float, rolls: bool) -> list[Placed]:
     """The boxes that together fill a prism in place of a cylinder along z.
 
-    Each is as wide as one side of the prism, and reaches from there through the axis to the opposite side. The prism lies inside
-    a cylinder that `rolls`; else its sides are as far outside the cylinder as inside.
+    Each is as wide as one side of the prism, and reaches from there through the axis to the
+    opposite side. The prism lies inside a cylinder that `rolls`; else its sides are as far outside
+    the cylinder as inside.
     """
     needed = math.pi / math.acos(max(0.0, 1.0 - FLAT / radius))
     half = math.ceil(min(max(needed, FEWEST_SIDES), MOST_SIDES) / 2)
@@ -171,7 +182,9 @@ def prism(radius: float, length: float, rolls: bool) -> list[Placed]:
 
 @dataclass(frozen=True, slots=True)
 class Wheel:
-    """What rolls: `radius` and `width` in m, its axle along the z axis of `pose` in the frame of the collision."""
+    """What rolls: `radius` and `width` in m, its axle along the z axis of `pose` in the frame of
+    the collision.
+    """
 
     radius: float
     width: float
@@ -179,7 +192,8 @@ class Wheel:
 
 
 def tyre(wheel: Wheel) -> list[Placed]:
-    """The spheres that stand for a wheel: a ring of them, which has a real tyre's round shoulders, or several side by side.
+    """The spheres that stand for a wheel: a ring of them, which has a real tyre's round shoulders,
+    or several side by side.
 
     The mean radius on which it rolls is the wheel's.
     """
@@ -194,7 +208,8 @@ def tyre(wheel: Wheel) -> list[Placed]:
             for part in ring(radius, shoulder, place)
         ]
     else:
-        # Between two rings that are its shoulders the whole wheel fits as a ball, which it rolls on.
+        # Between two rings that are its shoulders the whole wheel fits as a ball, which it rolls
+        # on.
         within = radius * (1 - BUMP_SHARE)
         spheres = [part for place in (-inside, inside) for part in ring(within, shoulder, place)]
         spheres += [
@@ -206,15 +221,19 @@ def tyre(wheel: Wheel) -> list[Placed]:
 
 
 def _spread(inside: float, step: float) -> list[float]:
-    """Places from -`inside` to `inside` (m), evenly and at most two `step` (m) apart; the middle if that is all."""
+    """Places from -`inside` to `inside` (m), evenly and at most two `step` (m) apart; the middle if
+    that is all.
+    """
     count = 1 + math.ceil(inside / step - 1e-9)
     return np.linspace(-inside, inside, count).tolist() if count > 1 else [0.0]
 
 
 def ring(radius: float, width: float, height: float) -> list[Placed]:
-    """Spheres of the radius `width` (m) in a ring around z at `height` (m), which reach as far as a wheel of `radius` (m).
+    """Spheres of the radius `width` (m) in a ring around z at `height` (m), which reach as far as a
+    wheel of `radius` (m).
 
-    A wheel's centre is highest where it stands on one sphere, and lowest between two: it rolls on the mean, so they stand out.
+    A wheel's centre is highest where it stands on one sphere, and lowest between two: it rolls on
+    the mean, so they stand out.
     """
     inner = radius - width
     if inner < BUMP_SHARE * radius:
@@ -231,14 +250,17 @@ def ring(radius: float, width: float, height: float) -> list[Placed]:
     return [Placed(Sphere(width), Pose(place)) for place in places]
 
 
-# A shape is a wheel if its axis is that of the joint, up to this share of its radius, and it is so round.
+# A shape is a wheel if its axis is that of the joint, up to this share of its radius, and it is so
+# round.
 CENTRED = 0.03
 ROUND = 0.95
 DIRECTIONS = 24
 
 
 def wheel_of(collision: Collision, axle: Joint) -> Wheel | None:
-    """The wheel that a collision is on the joint `axle`; None if it is none, or rolls on spheres anyway."""
+    """The wheel that a collision is on the joint `axle`; None if it is none, or rolls on spheres
+    anyway.
+    """
     # The axle as seen from the collision.
     back = collision.pose.inverse()
     axis = np.array(back.rotate(axle.axis))
@@ -260,7 +282,9 @@ def wheel_of(collision: Collision, axle: Joint) -> Wheel | None:
 
 
 def _round_mesh(vertices: Floats, place: Floats, axis: Floats) -> Wheel | None:
-    """The wheel that a hull of `vertices` (N, 3) m is about the line through `place` (3,) m along the unit vector `axis` (3,)."""
+    """The wheel that a hull of `vertices` (N, 3) m is about the line through `place` (3,) m along
+    the unit vector `axis` (3,).
+    """
     turn = pointing(vector(axis))
     points = (vertices - place) @ turn.rotation()
     far = np.hypot(points[:, 0], points[:, 1])

@@ -1,7 +1,8 @@
 """What stands for a convex mesh: a box or a cylinder if it is one, else pieces that are not long.
 
-Drake's general solver is wrong at the edges of meshes, and the more so the longer the mesh is (`contact_shapes.py`). Against one of
-8 m a wheel is stopped by a lip of 1 mm; against pieces of at most 4 m the highest kerb that a robot climbs is right within 10 %.
+Drake's general solver is wrong at the edges of meshes, and the more so the longer the mesh is
+(`contact_shapes.py`). Against one of 8 m a wheel is stopped by a lip of 1 mm; against pieces of at
+most 4 m the highest kerb that a robot climbs is right within 10 %.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from ddenv.world.pose import HERE, Pose, pointing, vector
 
 LONGEST = 2.0  # of a piece along any axis of its mesh, m
 MOST_PIECES = 512  # of one mesh: of a larger one the pieces are longer
-# A prism with at least this many sides is a cylinder if its corners lie on a circle within this share of the radius.
+# A prism with at least this many sides is a cylinder if its corners lie on a circle within this
+# share of the radius.
 SIDES = 12
 ROUND = 0.01
 
@@ -39,7 +41,9 @@ def _solid(mesh: Mesh) -> trimesh.Trimesh:
 
 
 def _as_cylinder(mesh: Mesh) -> tuple[Shape, Pose] | None:
-    """The cylinder that `mesh` stands for if it is a regular prism of many sides; None if it is another shape."""
+    """The cylinder that `mesh` stands for if it is a regular prism of many sides; None if it is
+    another shape.
+    """
     if len(mesh.vertices) < 2 * SIDES:
         return None
     middle = mesh.vertices.mean(axis=0)
@@ -59,7 +63,9 @@ def _as_cylinder(mesh: Mesh) -> tuple[Shape, Pose] | None:
 
 
 def _cut(mesh: Mesh) -> list[Mesh]:
-    """The pieces of a convex mesh, cut along the planes of a grid; the mesh itself if it is short."""
+    """The pieces of a convex mesh, cut along the planes of a grid; the mesh itself if it is
+    short.
+    """
     low = mesh.vertices.min(axis=0)
     high = mesh.vertices.max(axis=0)
     longest = LONGEST
@@ -77,7 +83,9 @@ def _cut(mesh: Mesh) -> list[Mesh]:
 def _halves(
     vertices: Floats, faces: Floats, normal: Floats, place: Floats
 ) -> list[tuple[Floats, Floats]]:
-    """The convex hull of `vertices`, cut by the plane through `place` (3,) m; one part if the plane misses it."""
+    """The convex hull of `vertices`, cut by the plane through `place` (3,) m; one part if the plane
+    misses it.
+    """
     sides = (
         trimesh.intersections.slice_faces_plane(vertices, faces, side * normal, place)[0]
         for side in (-1, 1)

@@ -1,7 +1,7 @@
 """Builds Drake's plant from plain data: a world's models and one robot.
 
-What never moves is registered on the world body, which keeps its many boxes out of Drake's tree of moving geometry.
-There is no visual geometry: nobody looks at a worker.
+What never moves is registered on the world body, which keeps its many boxes out of Drake's tree of
+moving geometry. There is no visual geometry: nobody looks at a worker.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ from ddenv.world.model import Inertia, Joint, Link, Model, World, held_with, is_
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Simulation
 
-# Where the twins of models wait that are not at rest: this deep, and this far from each other, m. Shapes in one place would make
-# Drake's search for contacts slow.
+# Where the twins of models wait that are not at rest: this deep, and this far from each other, m.
+# Shapes in one place would make Drake's search for contacts slow.
 DEEP = -1e5
 DEEPER = -2e5
 APART = 1e3
@@ -58,7 +58,8 @@ MANY = 8  # a model with more shapes than this has a twin with bodies of its own
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """A collision shape of a twin on the world's body, at `pose` in the frame of the model's link with the number `link`.
+    """A collision shape of a twin on the world's body, at `pose` in the frame of the model's link
+    with the number `link`.
 
     While it is not needed it waits at `away` in the world.
     """
@@ -72,11 +73,13 @@ class Part:
 
 @dataclass(frozen=True)
 class Twin:
-    """What stands for a model where it lies at rest: `parts`, or where it has many shapes a body for each link.
+    """What stands for a model where it lies at rest: `parts`, or where it has many shapes a body
+    for each link.
 
-    `geometry` are its shapes, `places` the frames that such bodies are welded to, each with where it waits in the world while it is
-    not needed. To move a shape of the world takes Drake longer the more shapes the plant has: half a millisecond in a world of
-    boards, 12 ms among 3,200. To move a frame takes it microseconds, but each body costs 14 us in every step.
+    `geometry` are its shapes, `places` the frames that such bodies are welded to, each with where
+    it waits in the world while it is not needed. To move a shape of the world takes Drake longer
+    the more shapes the plant has: half a millisecond in a world of boards, 12 ms among 3,200. To
+    move a frame takes it microseconds, but each body costs 14 us in every step.
     """
 
     geometry: tuple[GeometryId, ...]
@@ -88,9 +91,9 @@ class Twin:
 class Body:
     """A model in the plant, the first link first.
 
-    `links` are the links' bodies, `poses` their start poses in the world frame, `geometry` the collision geometry of the links that
-    can move. `bounds` are the boxes around the links in each link's own frame; None for a link that cannot move or has no
-    geometry.
+    `links` are the links' bodies, `poses` their start poses in the world frame, `geometry` the
+    collision geometry of the links that can move. `bounds` are the boxes around the links in each
+    link's own frame; None for a link that cannot move or has no geometry.
     """
 
     name: str
@@ -109,10 +112,12 @@ class Body:
 class Built:
     """The plant of a world.
 
-    `static` is the geometry that never moves, by model: that of static models, and of links of dynamic models that are fixed to the
-    world. `moving` are the dynamic models in the order in which they were added; `twins` stand for those of them that float.
-    `own_pairs` are the geometries of each two links of a model that touch each other: none, unless it collides with itself.
-    `apart` are sets of shapes that never touch each other, since others touch in their place (`Placed.touches`).
+    `static` is the geometry that never moves, by model: that of static models, and of links of
+    dynamic models that are fixed to the world. `moving` are the dynamic models in the order in
+    which they were added; `twins` stand for those of them that float. `own_pairs` are the
+    geometries of each two links of a model that touch each other: none, unless it collides with
+    itself. `apart` are sets of shapes that never touch each other, since others touch in their
+    place (`Placed.touches`).
     """
 
     diagram: Diagram
@@ -126,7 +131,9 @@ class Built:
     apart: tuple[tuple[GeometrySet, GeometrySet], ...]
 
     def shapes(self) -> list[tuple[str, tuple[GeometryId, ...]]]:
-        """The collision shapes of each model but the robot: first those that never move, then those that can."""
+        """The collision shapes of each model but the robot: first those that never move, then those
+        that can.
+        """
         return [
             *self.static.items(),
             *((name, body.geometry) for name, body in self.moving.items()),
@@ -138,7 +145,8 @@ def build(
 ) -> Built:
     """The finished plant. `motor_gain` (N m s/rad) turns a wheel's speed error into torque.
 
-    Raises ValueError or RuntimeError for what cannot be simulated, such as a moving link without inertia.
+    Raises ValueError or RuntimeError for what cannot be simulated, such as a moving link without
+    inertia.
     """
     config = MultibodyPlantConfig(
         time_step=simulation.time_step,
@@ -151,8 +159,8 @@ def build(
     plant, scene_graph = AddMultibodyPlant(config, builder)
     plant.mutable_gravity_field().set_gravity_vector(np.array(world.gravity))
     wheels = wheel_friction(robot, drive)
-    # The order in which models are added is the order of the solver's unknowns, which decides the last bits of every result. The
-    # robot comes first.
+    # The order in which models are added is the order of the solver's unknowns, which decides the
+    # last bits of every result. The robot comes first.
     models = sorted(world.models, key=_place_in_order)
     static, touched_by = _add_still(plant, models, wheels)
     driver = _add_moving(plant, scene_graph, robot, "robot", None)
@@ -211,7 +219,9 @@ def build(
 def _apart(
     inspector: SceneGraphInspector, touched_by: dict[str, list[GeometryId]], bodies: Sequence[Body]
 ) -> tuple[tuple[GeometrySet, GeometrySet], ...]:
-    """The pairs of sets of shapes that never touch each other; none if there is nothing that only some shapes can touch."""
+    """The pairs of sets of shapes that never touch each other; none if there is nothing that only
+    some shapes can touch.
+    """
     if not touched_by["spheres"]:
         return ()
     moving = [geometry for body in bodies for geometry in body.geometry]
@@ -247,7 +257,8 @@ def _add_still(
 
 
 def _place_in_order(model: Model) -> tuple[object, ...]:
-    """What sorts models by where they are and what shapes they have; by name only where these are equal.
+    """What sorts models by where they are and what shapes they have; by name only where these are
+    equal.
 
     So a run does not depend on the order of the models in a file.
     """
@@ -359,15 +370,18 @@ def _register(
 
 
 def spatial_inertia(inertia: Inertia, link: Pose) -> SpatialInertia:
-    """`inertia` about the origin of the frame `link`, in its axes. Raises RuntimeError for an impossible inertia."""
+    """`inertia` about the origin of the frame `link`, in its axes. Raises RuntimeError for an
+    impossible inertia.
+    """
     place = transform(link.inverse() @ inertia.pose)
     central = RotationalInertia(*inertia.moments, *inertia.products).ReExpress(place.rotation())
     return SpatialInertia.MakeFromCentralInertia(inertia.mass, place.translation(), central)
 
 
-# Drake's ball joint has roll, pitch and yaw, and locks (gimbal lock) where the child's x axis is parallel to the parent's z axis.
-# These joint axes, the same on both sides, are oblique to every axis of the world, so that no swing about one of those, like that
-# of something that hangs straight down, reaches the lock.
+# Drake's ball joint has roll, pitch and yaw, and locks (gimbal lock) where the child's x axis is
+# parallel to the parent's z axis.
+# These joint axes, the same on both sides, are oblique to every axis of the world, so that no swing
+# about one of those, like that of something that hangs straight down, reaches the lock.
 BALL_AXES = np.array([[0.8, 0.0, -0.6], [0.36, 0.8, 0.48], [0.48, -0.6, 0.64]])
 
 
@@ -377,8 +391,11 @@ def _add_joint(
     links: dict[str, tuple[Link, RigidBody]],
     instance_name: str,
 ) -> None:
-    """Adds `joint` between two of `links`, or between one of them and the world. Raises ValueError for an unknown kind."""
-    # The axes of both frames, as columns, are the same in the start pose, so that every joint position is 0 there.
+    """Adds `joint` between two of `links`, or between one of them and the world. Raises ValueError
+    for an unknown kind.
+    """
+    # The axes of both frames, as columns, are the same in the start pose, so that every joint
+    # position is 0 there.
     axes = BALL_AXES if joint.kind == "ball" else np.eye(3)
     if joint.kind == "universal":
         first = np.array(joint.axis)

@@ -1,8 +1,10 @@
-"""The part of a world that is in the plant: what never moves is left out where nothing comes near it.
+"""The part of a world that is in the plant: what never moves is left out where nothing comes near
+it.
 
-Drake knows every pair of shapes: 5,000 crates take minutes to build and gigabytes to hold. What nothing touches changes no bit of a
-run, so the plant has only what lies around the robot's way and around models that can move. A run in which something comes near the
-region's edge is given up, and made again from its start in a larger one: as if that had been the plant from the beginning.
+Drake knows every pair of shapes: 5,000 crates take minutes to build and gigabytes to hold. What
+nothing touches changes no bit of a run, so the plant has only what lies around the robot's way and
+around models that can move. A run in which something comes near the region's edge is given up, and
+made again from its start in a larger one: as if that had been the plant from the beginning.
 """
 
 from __future__ import annotations
@@ -19,10 +21,11 @@ from ddenv.world.pose import Point
 
 WIDTH = 8.0  # how far a region extends to each side of the straight way to the goal, m
 AROUND = 4.0  # and around each model that can move, m: most of them fall or lie where they are
-# Whatever is simulated keeps this distance from the edge at each tick, m: between two ticks nothing gets so far and back, unless it
-# does 40 m/s.
+# Whatever is simulated keeps this distance from the edge at each tick, m: between two ticks nothing
+# gets so far and back, unless it does 40 m/s.
 MARGIN = 2.0
-# A world with at most so many shapes that never move is in the plant as a whole: that costs less than to watch an edge.
+# A world with at most so many shapes that never move is in the plant as a whole: that costs less
+# than to watch an edge.
 FEW = 300
 
 
@@ -36,7 +39,9 @@ class LeftRegion(Exception):
 
 @dataclass(frozen=True)
 class Region:
-    """All places within `widths` (S,) m of straight lines from `starts` (S, 2) m to `ends` (S, 2) m, seen from above."""
+    """All places within `widths` (S,) m of straight lines from `starts` (S, 2) m to `ends` (S, 2)
+    m, seen from above.
+    """
 
     starts: Floats
     ends: Floats
@@ -65,7 +70,9 @@ class Region:
         return bool(self._depths(np.array([place]))[0] + radius >= 0)
 
     def far(self, models: Iterable[Model]) -> frozenset[str]:
-        """The names of those among `models` that never move and lie outside; none if there are few shapes in all."""
+        """The names of those among `models` that never move and lie outside; none if there are few
+        shapes in all.
+        """
         static = [model for model in models if model.static]
         if sum(len(model.collisions) for model in static) <= FEW:
             return frozenset()
@@ -75,13 +82,17 @@ class Region:
         return frozenset(name for (name, _), out in zip(found, outside, strict=True) if out)
 
     def watch(self, place: Point, reach: float, models: Bounds) -> None:
-        """As `check` for the boxes `models`, and for the robot, no part of which is farther than `reach` (m) from `place`."""
+        """As `check` for the boxes `models`, and for the robot, no part of which is farther than
+        `reach` (m) from `place`.
+        """
         self.check(models)
         if not float(self._depths(np.array([place]))[0]) >= reach + MARGIN:
             raise LeftRegion(place)
 
     def check(self, boxes: Bounds) -> None:
-        """Raises LeftRegion unless all boxes, between corners (N, 3) m and (N, 3) m, keep their distance from the edge."""
+        """Raises LeftRegion unless all boxes, between corners (N, 3) m and (N, 3) m, keep their
+        distance from the edge.
+        """
         low, high = boxes
         if not len(low):
             return

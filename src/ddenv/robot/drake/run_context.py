@@ -1,4 +1,6 @@
-"""What all runs in one plant share: its context, who can touch whom, who is held still, and who lies as part of the ground."""
+"""What all runs in one plant share: its context, who can touch whom, who is held still, and who
+lies as part of the ground.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,10 @@ from ddenv.world.pose import Pose
 class Presence:
     """The collision filters of one context.
 
-    Moving models touch only what `join` has connected them with, also within a model that collides with itself: what is not
-    joined must not be in the solver's problem. (Drake's transient filters, which it could take back itself, copy all pairs of the
-    world: 170 ms instead of 3 in a world of 1300 boxes.)
+    Moving models touch only what `join` has connected them with, also within a model that collides
+    with itself: what is not joined must not be in the solver's problem. (Drake's transient filters,
+    which it could take back itself, copy all pairs of the world: 170 ms instead of 3 in a world of
+    1300 boxes.)
     """
 
     def __init__(self, built: Built, context: Context) -> None:
@@ -41,9 +44,11 @@ class Presence:
         self.part(tuple(built.moving.values()), ())
 
     def remove(self, removed: frozenset[str]) -> None:
-        """Removes what never moves of the models `removed`, and puts back all others. Moving models are simply not joined.
+        """Removes what never moves of the models `removed`, and puts back all others. Moving models
+        are simply not joined.
 
-        Only the difference to the last call costs time: most runs keep nearly the same models as the run before.
+        Only the difference to the last call costs time: most runs keep nearly the same models as
+        the run before.
         """
         static = self._built.static
         gone = [static[name] for name in removed - self._removed if static.get(name)]
@@ -59,12 +64,16 @@ class Presence:
         self._kept = {name: geometry for name, geometry in static.items() if name not in removed}
 
     def join(self, bodies: Sequence[Body], others: Sequence[Body], robot: bool = True) -> None:
-        """Lets `bodies` touch themselves, each other, `others`, what is kept and never moves, and with `robot` also the robot."""
+        """Lets `bodies` touch themselves, each other, `others`, what is kept and never moves, and
+        with `robot` also the robot.
+        """
         self._apply(CollisionFilterDeclaration.AllowBetween, bodies, others, robot)
         self._keep_apart()
 
     def part(self, bodies: Sequence[Body], others: Sequence[Body]) -> None:
-        """Undoes `join`. `others` are the moving models that `bodies` could touch besides each other."""
+        """Undoes `join`. `others` are the moving models that `bodies` could touch besides each
+        other.
+        """
         self._apply(CollisionFilterDeclaration.ExcludeBetween, bodies, others, True)
 
     def _keep_apart(self) -> None:
@@ -102,7 +111,8 @@ def _set(groups: Iterable[tuple[GeometryId, ...]]) -> GeometrySet:
     return GeometrySet([member for group in groups for member in group])
 
 
-# Held joints are kept this far inside their limits (rad or m): a joint at its limit is work for the solver.
+# Held joints are kept this far inside their limits (rad or m): a joint at its limit is work for the
+# solver.
 INSIDE = 1e-6
 # Where models wait that are not simulated: this far from each other along x, and this high, m.
 APART = 1e3
@@ -113,7 +123,8 @@ class Hold:
     """The held models of one context: each at a fixed pose, with zero velocity and without weight.
 
     With their collisions filtered out (`Presence`) they are no part of the solver's problem.
-    (`Joint.Lock` would do the same, but crashes Drake where static geometry is on the world body, drake#24773.)
+    (`Joint.Lock` would do the same, but crashes Drake where static geometry is on the world body,
+    drake#24773.)
 
     `start` (P + V,) are the plant's positions and velocities at the start of every run.
     """
@@ -150,7 +161,9 @@ class Hold:
         return np.concatenate([np.empty(0), *found]).astype(int)
 
     def begin(self, others: Sequence[Body] = ()) -> None:
-        """Puts everything where it starts, but all moving models and `others` away, where it holds them."""
+        """Puts everything where it starts, but all moving models and `others` away, where it holds
+        them.
+        """
         self._held[:] = False
         self.reset()
         entries = self.entries([*self._bodies, *others])
@@ -163,7 +176,9 @@ class Hold:
         self._plant.SetPositionsAndVelocities(self._context, to_drake(self.start))
 
     def put(self, entries: Integers, values: Floats) -> None:
-        """Holds `entries` (E,) of the state at the positions in `values` (E,), from the next `apply` on."""
+        """Holds `entries` (E,) of the state at the positions in `values` (E,), from the next
+        `apply` on.
+        """
         self._held[entries] = self._changed = True
         self._state[entries] = values
         self._state[: self._count] = np.clip(self._state[: self._count], self._low, self._high)
@@ -184,8 +199,9 @@ class Hold:
     def apply(self) -> None:
         """Puts every held model in its place and cancels its weight.
 
-        Call this at each tick. Free bodies would stay where they are to the last bit, but a model that stands upright on a
-        joint is like a pencil on its tip: rounding alone would topple it within seconds.
+        Call this at each tick. Free bodies would stay where they are to the last bit, but a model
+        that stands upright on a joint is like a pencil on its tip: rounding alone would topple it
+        within seconds.
         """
         if not (self._bodies or self._changed):
             return
@@ -217,7 +233,9 @@ class Twins:
         self._laid: dict[str, Body] = {}
 
     def lay(self, body: Body, places: Floats, turns: Floats) -> None:
-        """Puts the twin of `body` where its links are: places (L, 3) m and rotations (L, 3, 3) in the world frame."""
+        """Puts the twin of `body` where its links are: places (L, 3) m and rotations (L, 3, 3) in
+        the world frame.
+        """
         self._laid[body.name] = body
         links = [
             RigidTransform(RotationMatrix.ProjectToRotationMatrix(to_drake(turn)), to_drake(place))
@@ -242,7 +260,8 @@ class Twins:
             self._scene_graph.ChangeShape(
                 self._context, self._source, part.geometry, part.shape, pose
             )
-        # Drake adds such a shape anew. Where it then touched one on a body that is welded to the world, Drake would crash.
+        # Drake adds such a shape anew. Where it then touched one on a body that is welded to the
+        # world, Drake would crash.
         moved = GeometrySet([part.geometry for part in twin.parts])
         self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(moved, self._welded))
         for number, (frame, away) in enumerate(twin.places):
@@ -254,8 +273,8 @@ class Twins:
 class RunContext:
     """A plant with the one context that all its runs use in turn.
 
-    A new context costs as much as a run. What falls below `floor` (m) has fallen out of the world. What never moves outside
-    `region` is not in the plant; None if everything is.
+    A new context costs as much as a run. What falls below `floor` (m) has fallen out of the world.
+    What never moves outside `region` is not in the plant; None if everything is.
     """
 
     def __init__(

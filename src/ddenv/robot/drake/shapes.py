@@ -32,14 +32,16 @@ from ddenv.world.model import (
 )
 from ddenv.world.pose import Pose, Vector
 
-# The contact of two surfaces is as stiff as both in series. Drake would derive it from the masses in the world, and removing a
-# model would change the contacts of all others; here it follows from the model's own mass. On a single contact no model sinks by
-# more than `SINK`, and none is softer than `SOFTEST`. What never moves is rigid.
+# The contact of two surfaces is as stiff as both in series. Drake would derive it from the masses
+# in the world, and removing a model would change the contacts of all others; here it follows from
+# the model's own mass. On a single contact no model sinks by more than `SINK`, and none is softer
+# than `SOFTEST`. What never moves is rigid.
 SINK = 4e-3  # m
 SOFTEST = 1e5  # N/m
 RIGID = 1e12  # N/m
 GRAVITY = 9.81  # m/s^2, whatever the world's is
-# Hunt-Crossley dissipation, s/m. Wheels have less: it makes each of their spheres push as it comes, but grip only a step later.
+# Hunt-Crossley dissipation, s/m. Wheels have less: it makes each of their spheres push as it comes,
+# but grip only a step later.
 DISSIPATION = 5.0
 WHEEL_DISSIPATION = 0.5
 
@@ -76,10 +78,12 @@ def wheel_friction(robot: Model, drive: Drive) -> float:
 
 
 def world_friction(mu: float, wheels: float) -> float:
-    """The friction coefficient of a surface of the world in Drake, so that the robot's wheels grip it as in Gazebo.
+    """The friction coefficient of a surface of the world in Drake, so that the robot's wheels grip
+    it as in Gazebo.
 
-    Gazebo's ODE takes the smaller of two surfaces' coefficients, m = min(mu, wheels). Drake combines a and b as 2 a b / (a + b),
-    which is m for b = wheels and 1 / a = 2 / m - 1 / b. The user guide says what that makes of other contacts.
+    Gazebo's ODE takes the smaller of two surfaces' coefficients, m = min(mu, wheels). Drake
+    combines a and b as 2 a b / (a + b), which is m for b = wheels and 1 / a = 2 / m - 1 / b. The
+    user guide says what that makes of other contacts.
     """
     grip = min(mu, wheels)
     return 1.0 / (2.0 / grip - 1.0 / wheels) if grip > 0.0 else 0.0
@@ -88,9 +92,11 @@ def world_friction(mu: float, wheels: float) -> float:
 def surface(
     mu: float, stiffness: float, dissipation: float = DISSIPATION
 ) -> drake.ProximityProperties:
-    """A surface with Drake's friction coefficient `mu`, its `stiffness` (N/m) and `dissipation` (s/m).
+    """A surface with Drake's friction coefficient `mu`, its `stiffness` (N/m) and `dissipation`
+    (s/m).
 
-    Static and dynamic friction are equal: with a difference, wheels stick and slip at the rate of the time steps.
+    Static and dynamic friction are equal: with a difference, wheels stick and slip at the rate of
+    the time steps.
     """
     properties = drake.ProximityProperties()
     drake.AddContactMaterial(dissipation, stiffness, CoulombFriction(mu, mu), properties)
@@ -99,7 +105,9 @@ def surface(
 
 @dataclass(frozen=True, slots=True)
 class Solid:
-    """A shape in Drake with its `pose` in the world, as the model starts; `touches` is that of `Placed`."""
+    """A shape in Drake with its `pose` in the world, as the model starts; `touches` is that of
+    `Placed`.
+    """
 
     shape: drake.Shape
     pose: Pose
@@ -108,10 +116,11 @@ class Solid:
 
 
 def link_solids(model: Model, link: Link, wheels: float | None, corners: bool) -> list[Solid]:
-    """What stands in Drake for the collisions of a link of the world, or (`wheels` is None) of the robot.
+    """What stands in Drake for the collisions of a link of the world, or (`wheels` is None) of the
+    robot.
 
-    `wheels` is the robot's `wheel_friction`. With `corners` each collision also gets small spheres to rest on: a face that rests
-    on a single contact point would creep.
+    `wheels` is the robot's `wheel_friction`. With `corners` each collision also gets small spheres
+    to rest on: a face that rests on a single contact point would creep.
     """
     dissipation = WHEEL_DISSIPATION if turning_joints(model, link) else DISSIPATION
     rests = resting_corners(link.collisions) if corners else [[]] * len(link.collisions)
@@ -136,9 +145,11 @@ MESH_CORNERS = 32
 
 
 def resting_corners(collisions: Sequence[Collision]) -> list[list[Vector]]:
-    """For each of the collisions of a link the corners on which the link can rest, in the frame of its shape, m.
+    """For each of the collisions of a link the corners on which the link can rest, in the frame of
+    its shape, m.
 
-    Of many corners these are the outermost: Drake takes time for each pair of shapes when it builds a plant.
+    Of many corners these are the outermost: Drake takes time for each pair of shapes when it builds
+    a plant.
     """
     corners = [corners_of(collision.shape) for collision in collisions]
     if sum(map(len, corners)) <= MOST_CORNERS:
@@ -177,7 +188,9 @@ def drake_shape(shape: Shape) -> drake.Shape:
 
 
 def corners_of(shape: Shape) -> list[Vector]:
-    """The centres of spheres just inside the corners of `shape`, in its frame, m; none for a shape without flat faces."""
+    """The centres of spheres just inside the corners of `shape`, in its frame, m; none for a shape
+    without flat faces.
+    """
     match shape:
         case Box(size):
             x, y, z = (max(side / 2 - CORNER_RADIUS, 0.0) for side in size)
@@ -197,7 +210,9 @@ def corners_of(shape: Shape) -> list[Vector]:
 
 
 def _mesh_corners(mesh: Mesh) -> list[Vector]:
-    """Up to `MESH_CORNERS` vertices of a convex mesh, far from each other, each moved inside the faces that meet there."""
+    """Up to `MESH_CORNERS` vertices of a convex mesh, far from each other, each moved inside the
+    faces that meet there.
+    """
     edges = mesh.vertices[mesh.faces[:, 1:]] - mesh.vertices[mesh.faces[:, :1]]
     normals = np.cross(edges[:, 0], edges[:, 1])
     areas = np.linalg.norm(normals, axis=1)

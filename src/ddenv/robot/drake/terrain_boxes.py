@@ -1,7 +1,9 @@
-"""The boxes that stand for terrain: Drake computes the contact of a wheel's spheres with boxes exactly, unlike with triangles.
+"""The boxes that stand for terrain: Drake computes the contact of a wheel's spheres with boxes
+exactly, unlike with triangles.
 
-The grid is halved until a plane is near enough to each part; a box lies below that plane, tilted like it. So level ground is one
-box. What stands for a part does not depend on which other parts are wanted.
+The grid is halved until a plane is near enough to each part; a box lies below that plane, tilted
+like it. So level ground is one box. What stands for a part does not depend on which other parts are
+wanted.
 """
 
 from __future__ import annotations
@@ -18,8 +20,8 @@ from ddenv.world.model import Box, Collision, Model, Terrain
 from ddenv.world.pose import Pose, pointing, vector
 from ddenv.world.terrain import bilinear, height_at
 
-# How far the surface may be from the boxes, m: the first of these with which at most `MOST` boxes stand around the robot's way, or
-# the last. More boxes would take too much memory.
+# How far the surface may be from the boxes, m: the first of these with which at most `MOST` boxes
+# stand around the robot's way, or the last. More boxes would take too much memory.
 TOLERANCES = tuple(0.01 * 2 ** (number / 2) for number in range(16))
 MOST = 1200
 FINEST = 1 / 16  # the width of the smallest part, in cells of the grid
@@ -63,7 +65,9 @@ def _parts(collision: Collision, region: Region | None, way: Region) -> list[Col
 def boxes(
     terrain: Terrain, place: Pose, region: Region | None, tolerance: float
 ) -> Iterator[tuple[Box, Pose]]:
-    """The boxes, no farther than `tolerance` (m) from the surface of terrain at `place`, that reach into `region`."""
+    """The boxes, no farther than `tolerance` (m) from the surface of terrain at `place`, that reach
+    into `region`.
+    """
     cells = np.array(terrain.heights.shape[::-1]) - 1.0
     step = np.array(terrain.size) / cells
     # The lowest and the highest corner of each part, in cells of the grid.
@@ -97,7 +101,8 @@ def boxes(
 def _box(
     terrain: Terrain, low: Floats, high: Floats, middle: Floats, half: Floats, tolerance: float
 ) -> tuple[Box, Pose] | None:
-    """The box below the plane that is nearest to the part from `low` to `high` (2,) cells; None if it is too far away.
+    """The box below the plane that is nearest to the part from `low` to `high` (2,) cells; None if
+    it is too far away.
 
     The part has its `middle` (2,) m in the frame of the terrain, and `half` the size (2,) m.
     """
@@ -117,7 +122,8 @@ def _box(
     normal = np.array([-slope_x, -slope_y, 1.0]) / np.sqrt(1 + slope_x**2 + slope_y**2)
     turn = pointing(vector(normal))
     axes = turn.rotation()
-    # The box covers the whole part: on a slope it reaches farther, but must not rise above the neighbours.
+    # The box covers the whole part: on a slope it reaches farther, but must not rise above the
+    # neighbours.
     edges = np.array([[half[0], 0.0, half[0] * slope_x], [0.0, half[1], half[1] * slope_y]])
     reach = np.abs(edges @ axes[:, :2]).sum(axis=0)
     top = np.append(middle, (rest.max() + rest.min()) / 2)

@@ -24,10 +24,12 @@ PIECE = 65536
 TICK = 0.2  # how often a silent command is checked, s
 # The maximum time between two checks that counts, s: it is longer where we were stopped ourselves.
 LONGEST_LOOK = 1.0
-# How long the supervisor may take to end a command, s: longer than the grace that it gives the command.
+# How long the supervisor may take to end a command, s: longer than the grace that it gives the
+# command.
 STOP_WAIT = 10.0
 MOST_LEFT = 16 * PIECE  # the maximum that can be left in a pipe when the command has ended, bytes
-# How much of the end of stderr is kept, in bytes, and how much of its last line is reported, in characters.
+# How much of the end of stderr is kept, in bytes, and how much of its last line is reported, in
+# characters.
 KEPT = 16384
 SHOWN = 200
 # Python exits with 1 for an exception that nobody catches, and says so with this line.
@@ -39,7 +41,8 @@ STOPPED = b"KeyboardInterrupt"
 class Ended:
     """How a command ended: with the exit code `code`, or without one for a `reason`.
 
-    `complaint` is the last line that it wrote to stderr; `raised` is True if that line ends an exception's traceback.
+    `complaint` is the last line that it wrote to stderr; `raised` is True if that line ends an
+    exception's traceback.
     """
 
     code: int | None
@@ -66,7 +69,9 @@ class Complaints:
         ]
 
     def is_exception(self) -> bool:
-        """Whether it ends with a traceback. That of an interrupted program does not count: it only says that it was stopped."""
+        """Whether it ends with a traceback. That of an interrupted program does not count: it only
+        says that it was stopped.
+        """
         _, found, after = self._end.rpartition(TRACEBACK)
         not_indented = [
             line for line in after.splitlines() if line.strip() and not line.startswith(b" ")
@@ -80,14 +85,18 @@ class Complaints:
 
 @dataclass(frozen=True)
 class Running:
-    """A command under its supervisor. `line` is the socket to the supervisor, `stdout` and `stderr` are the command's output."""
+    """A command under its supervisor. `line` is the socket to the supervisor, `stdout` and `stderr`
+    are the command's output.
+    """
 
     line: socket.socket
     stdout: IO[bytes]
     stderr: IO[bytes]
 
     def say(self, word: bytes) -> None:
-        """Has the supervisor start the command (`BEGIN`: its files are written), or end it early (`END`)."""
+        """Has the supervisor start the command (`BEGIN`: its files are written), or end it early
+        (`END`).
+        """
         with contextlib.suppress(OSError):
             self.line.send(word)
 
@@ -98,8 +107,9 @@ def running(
 ) -> Iterator[Running]:
     """The command `words`, which starts in `folder` at `BEGIN`.
 
-    At the end, nothing that the command started is left, and the folder `temporary` is removed, even if this process is killed
-    while it writes there. Raises OSError if no program can be started.
+    At the end, nothing that the command started is left, and the folder `temporary` is removed,
+    even if this process is killed while it writes there. Raises OSError if no program can be
+    started.
     """
     ours, theirs = socket.socketpair()
     start = [sys.executable, "-I", "-S", str(SUPERVISOR), str(temporary), *words]
@@ -134,9 +144,11 @@ def running(
 def watch(
     command: Running, seconds: float, take: Callable[[bytes], None], too_much: Callable[[], str]
 ) -> Ended:
-    """Waits for the command's end, for a maximum of `seconds` of wall clock, and reads all its output.
+    """Waits for the command's end, for a maximum of `seconds` of wall clock, and reads all its
+    output.
 
-    `take` gets what the command writes to stdout. As soon as `too_much()` returns a reason, the command is ended early.
+    `take` gets what the command writes to stdout. As soon as `too_much()` returns a reason, the
+    command is ended early.
     """
     complaints = Complaints()
     takers = ((command.stdout, take), (command.stderr, complaints.add))

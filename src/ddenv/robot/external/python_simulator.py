@@ -1,6 +1,8 @@
-"""A simulator in Python: a class of the user's, imported once by a worker, which runs one test after the other.
+"""A simulator in Python: a class of the user's, imported once by a worker, which runs one test
+after the other.
 
-Whatever it does wrong breaks the test, with the reason; the worker is replaced, since nobody knows what is left of the object.
+Whatever it does wrong breaks the test, with the reason; the worker is replaced, since nobody knows
+what is left of the object.
 """
 
 from __future__ import annotations
@@ -48,7 +50,9 @@ SHOWN = 80
 
 
 class PythonSimulator:
-    """Runs a class of the user's as `Template` runs Drake. docs/any-simulator.md says what the class has to do."""
+    """Runs a class of the user's as `Template` runs Drake. docs/any-simulator.md says what the
+    class has to do.
+    """
 
     def __init__(self, world: World, scenario: Scenario) -> None:
         """Raises UserError if there is no such class, or if it makes no object."""
@@ -81,7 +85,9 @@ class PythonSimulator:
             self._open = opened.pop_all()
 
     def close(self) -> None:
-        """Removes the files of its tests. They are also removed when this process ends, however it does."""
+        """Removes the files of its tests. They are also removed when this process ends, however it
+        does.
+        """
         self._open.close()
 
     def run(
@@ -91,7 +97,9 @@ class PythonSimulator:
         progress: Progress | None = None,
         ends: Ends | None = None,
     ) -> RunResult:
-        """As `Simulator.run`; `ends` has no effect. Raises UserError for whatever the user's class does wrong."""
+        """As `Simulator.run`; `ends` has no effect. Raises UserError for whatever the user's class
+        does wrong.
+        """
         if unknown := keep - self._names:
             raise ValueError(f"no such model: {min(unknown)}")
         started = time.perf_counter()
@@ -130,7 +138,9 @@ class PythonSimulator:
     def _ended(
         self, world: SubWorld, seed: int, poses: Poses
     ) -> tuple[Ended, frozenset[str] | None]:
-        """Makes a test, and adds what it yields and returns to `poses`. Raises BadLog for nonsense."""
+        """Makes a test, and adds what it yields and returns to `poses`. Raises BadLog for
+        nonsense.
+        """
         answer = self._simulator.run(world, seed, self._scenario.failure.timeout)
         if isinstance(answer, Generator):
             rows = answer
@@ -160,7 +170,8 @@ class PythonSimulator:
 
 
 class Poses:
-    """The poses of one test: those of the robot, and those of models and of `links` by name, each at most every 0.1 s.
+    """The poses of one test: those of the robot, and those of models and of `links` by name, each
+    at most every 0.1 s.
 
     `progress` gets them.
     """
@@ -205,7 +216,8 @@ class Poses:
         if name not in self._models:
             shown = str(name)[:SHOWN]
             raise BadLog(
-                f"{where}: there is no model '{shown}' in this test's world{nearest(shown, self._models)}"
+                f"{where}: there is no model '{shown}' in this test's "
+                f"world{nearest(shown, self._models)}"
             )
 
     def motions(self) -> dict[str, np.ndarray]:

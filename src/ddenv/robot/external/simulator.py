@@ -1,4 +1,5 @@
-"""A simulator of your own: each run writes the reduced world to a file and starts the scenario's command on it.
+"""A simulator of your own: each run writes the reduced world to a file and starts the scenario's
+command on it.
 
 The command writes a pose log: the poses of its robot, as CSV.
 """
@@ -42,7 +43,9 @@ OUTCOMES = {
 
 
 class ExternalSimulator:
-    """Runs a command as `Template` runs Drake. docs/any-simulator.md says what the command has to do."""
+    """Runs a command as `Template` runs Drake. docs/any-simulator.md says what the command has to
+    do.
+    """
 
     def __init__(self, world: World, scenario: Scenario) -> None:
         """Raises UserError if the command cannot be started."""
@@ -62,10 +65,11 @@ class ExternalSimulator:
         progress: Progress | None = None,
         ends: Ends | None = None,
     ) -> RunResult:
-        """As `Simulator.run`, with the robot's pose alone for `progress`, of each row that the command prints.
+        """As `Simulator.run`, with the robot's pose alone for `progress`, of each row that the
+        command prints.
 
-        `ends` has no effect: a command ends its runs itself. Whatever the command does becomes a result. Raises UserError if no
-        temporary file can be written.
+        `ends` has no effect: a command ends its runs itself. Whatever the command does becomes a
+        result. Raises UserError if no temporary file can be written.
         """
         unknown = keep - self._names
         if unknown:
@@ -87,8 +91,8 @@ class ExternalSimulator:
     def _execute(
         self, folder: Path, keep: frozenset[str], seed: int, progress: Progress | None
     ) -> tuple[Ended, PoseLog]:
-        """Runs the command on the world with the models `keep` to its end, and reads its pose log; all its files are in the new
-        folder `folder`. Raises UserError if no file can be written.
+        """Runs the command on the world with the models `keep` to its end, and reads its pose log;
+        all its files are in the new folder `folder`. Raises UserError if no file can be written.
         """
         world = folder / self._scenario.world.name
         file = (
@@ -154,9 +158,8 @@ class ExternalSimulator:
     def _judged(self, ended: Ended, log: PoseLog) -> tuple[str, str, Floats]:
         said = f": {ended.complaint}" if ended.complaint else ""
         if ended.code is None or ended.code not in OUTCOMES:
-            why = (
-                ended.reason
-                or f"the command's exit code is {ended.code}, neither 0 nor 1{_of_a_shell(ended.code)}"
+            why = ended.reason or (
+                f"the command's exit code is {ended.code}, neither 0 nor 1{_of_a_shell(ended.code)}"
             )
             return "error", why + said, self._rows(log)
         if ended.code == 1 and ended.raised:
@@ -167,7 +170,8 @@ class ExternalSimulator:
             timeout = self._scenario.failure.timeout
             if rows[-1, 0] > MUCH_LATER * timeout:
                 raise BadLog(
-                    f"the pose log ends at {rows[-1, 0]:g} s, and the timeout is {timeout:g} s: times are in s"
+                    f"the pose log ends at {rows[-1, 0]:g} s, and the timeout is {timeout:g} s: "
+                    "times are in s"
                 )
             return (
                 outcome,
@@ -187,13 +191,17 @@ class ExternalSimulator:
 
 
 def _of_a_shell(code: int | None) -> str:
-    """Which signal an exit code stands for, as shells have it, where a program under the command was ended by one."""
+    """Which signal an exit code stands for, as shells have it, where a program under the command
+    was ended by one.
+    """
     number = 0 if code is None else code - 128
     return f" ({signal_name(number)})" if number in set(signal.Signals) else ""
 
 
 def scenario_in(scenario: Scenario, whole: Whole, file: Path) -> bytes:
-    """The scenario in the part of its world in `file`, as YAML: for simulators that run the same robot."""
+    """The scenario in the part of its world in `file`, as YAML: for simulators that run the same
+    robot.
+    """
     there = {"oracle": None, "whole": whole, "world": file}
     data = scenario.model_copy(update=there).model_dump(mode="json")
     # Files beside the original world are not beside the reduced one.
@@ -207,7 +215,9 @@ def _numbers(*values: float) -> str:
 
 @contextlib.contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """The name of a folder that is made with its files, once a supervisor is there that removes it if this process is killed."""
+    """The name of a folder that is made with its files, once a supervisor is there that removes it
+    if this process is killed.
+    """
     try:
         folder = Path(tempfile.gettempdir()) / f"ddenv-{uuid.uuid4().hex}"
     except OSError as error:
@@ -257,8 +267,8 @@ class BadLog(WrongAnswer):
 class PoseLog:
     """Reads a log piece by piece. It keeps the first row, a row every 0.1 s, and the last one.
 
-    Blank lines and lines that begin with # are skipped; the first line may be a header. `progress` gets each row that is kept,
-    except for the last. `size` is the number of bytes so far.
+    Blank lines and lines that begin with # are skipped; the first line may be a header. `progress`
+    gets each row that is kept, except for the last. `size` is the number of bytes so far.
     """
 
     def __init__(self, progress: Progress | None = None) -> None:
@@ -322,7 +332,8 @@ class PoseLog:
         began = self._began
         self._began = True
         if not began and not numbers:
-            # A header may name eight columns as it likes, but must not name the quaternion's in another order.
+            # A header may name eight columns as it likes, but must not name the quaternion's in
+            # another order.
             turned = [field.lower() for field in fields[4:]]
             known = list(COLUMNS[4:])
             if len(fields) != len(COLUMNS) or (sorted(turned) == sorted(known) and turned != known):
@@ -335,7 +346,9 @@ class PoseLog:
             self._progress(kept[0], kept[1:], {})
 
     def take(self, numbers: Sequence[float], where: str) -> Row | None:
-        """Adds t, x, y, z, qx, qy, qz, qw, finite numbers; returns the row if it is kept. Raises BadLog, which says `where`."""
+        """Adds t, x, y, z, qx, qy, qz, qw, finite numbers; returns the row if it is kept. Raises
+        BadLog, which says `where`.
+        """
         if max(map(abs, numbers)) > GREATEST:
             raise BadLog(f"{where}: a number is above {GREATEST:g}: times are in s, places in m")
         t, x, y, z, *turn = numbers

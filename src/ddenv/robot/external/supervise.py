@@ -1,9 +1,11 @@
-"""Runs a command and ends it with everything that it started: `python -I -S supervise.py FOLDER PROGRAM [WORD...]`.
+"""Runs a command and ends it with everything that it started: `python -I -S supervise.py FOLDER
+PROGRAM [WORD...]`.
 
-Standard input is a socket to a worker. The command starts at a `+` from there. When it has ended, one line is sent back: `exit 3`,
-`signal 9`, or `error 13` if it could not be started. Another byte from the worker, or the worker's end, ends the command at once.
-At the end FOLDER is removed, also if the worker was killed before the command started.
-This is a program of its own because a worker that is killed cannot clean up.
+Standard input is a socket to a worker. The command starts at a `+` from there. When it has ended,
+one line is sent back: `exit 3`, `signal 9`, or `error 13` if it could not be started. Another byte
+from the worker, or the worker's end, ends the command at once. At the end FOLDER is removed, also
+if the worker was killed before the command started. This is a program of its own because a worker
+that is killed cannot clean up.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ import sys
 import time
 from pathlib import Path
 
-# How long a command may take to end before it is killed, and how long its remaining processes are killed, s.
+# How long a command may take to end before it is killed, and how long its remaining processes are
+# killed, s.
 GRACE = 2.0
 PATIENCE = 5.0
 PR_SET_PDEATHSIG = 1
@@ -76,7 +79,9 @@ def run(words: list[str], worker: socket.socket) -> str:
 
 
 def kill_children() -> None:
-    """Kills processes that have left the command's group. Those that lost their parent are our own children by now."""
+    """Kills processes that have left the command's group. Those that lost their parent are our own
+    children by now.
+    """
     until = time.monotonic() + PATIENCE
     while (pids := children()) and time.monotonic() < until:
         for pid in pids:

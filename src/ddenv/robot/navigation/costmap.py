@@ -1,4 +1,6 @@
-"""The costmap: what the lidar has seen around the robot, on a square grid that moves along with it."""
+"""The costmap: what the lidar has seen around the robot, on a square grid that moves along with
+it.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +19,13 @@ SPARE = 1e-6  # what rounding changes is less, m
 
 
 class Costmap:
-    """The occupied cells around the robot, aligned with the frame of the pose estimates. Cells that no beam has seen are free.
+    """The occupied cells around the robot, aligned with the frame of the pose estimates. Cells that
+    no beam has seen are free.
 
-    Each occupied cell keeps the last point at which a beam ended in it. The cells are stored in slots, numbered modulo the map's
-    width: as the map moves, cells that enter on one side take the slots of those that leave on the other. `spots` (3, N) are all
-    those points: x and y in m, and 1. `version` counts the changes: something appeared away from everything known, or something
+    Each occupied cell keeps the last point at which a beam ended in it. The cells are stored in
+    slots, numbered modulo the map's width: as the map moves, cells that enter on one side take the
+    slots of those that leave on the other. `spots` (3, N) are all those points: x and y in m, and
+    1. `version` counts the changes: something appeared away from everything known, or something
     vanished altogether.
     """
 
@@ -39,7 +43,8 @@ class Costmap:
         # The wheels stand this far below the frame of the points.
         self._lowest = planner.lowest - setup.radius
         self._slots: Integers = np.empty(0, dtype=int)
-        # The occupied slots at the last change of the version, and those that are occupied or next to one, (count^2,).
+        # The occupied slots at the last change of the version, and those that are occupied or next
+        # to one, (count^2,).
         self._known = self._slots
         self._around, self._hit = np.zeros((2, self.count**2), dtype=bool)
         beside = (-1, 0, 1)
@@ -57,7 +62,9 @@ class Costmap:
         return self.spots[:2].T
 
     def see(self, scan: Scan, estimate: Estimate, imu: Imu | None = None) -> None:
-        """Adds what `scan` shows, and clears what its beams pass through; `estimate` and `imu` are the robot's pose and tilt."""
+        """Adds what `scan` shows, and clears what its beams pass through; `estimate` and `imu` are
+        the robot's pose and tilt.
+        """
         if scan.angles is not self._angles:
             self._angles = scan.angles
             self._beams = np.stack([np.cos(scan.angles), np.sin(scan.angles)])
@@ -70,7 +77,9 @@ class Costmap:
         self._clear(scan, estimate, level=max(abs(roll), abs(pitch)) <= LEVEL)
 
     def forget(self, estimate: Estimate, beyond: float, beyond_unseen: float) -> None:
-        """Clears the map beyond `beyond` (m) from the robot, or beyond `beyond_unseen` (m) outside the lidar's field of view."""
+        """Clears the map beyond `beyond` (m) from the robot, or beyond `beyond_unseen` (m) outside
+        the lidar's field of view.
+        """
         dx, dy = (self.points - (estimate.x, estimate.y)).T
         bearings = np.arctan2(dy, dx) - estimate.heading
         bearings -= math.tau * np.round(bearings / math.tau)
@@ -83,7 +92,9 @@ class Costmap:
         self._keep(self._slots[near], self.spots[:, near])
 
     def _limits(self, scan: Scan, estimate: Estimate) -> Floats:
-        """The range (N,) m of each beam beyond which it marks nothing, and has passed all that is known in its direction."""
+        """The range (N,) m of each beam beyond which it marks nothing, and has passed all that is
+        known in its direction.
+        """
         count = len(scan.angles)
         limits = np.full(
             count, (self.count / 2 + PASSED) * self.resolution + math.hypot(*scan.origin[:2])
@@ -96,7 +107,8 @@ class Costmap:
             x = cosine * dx + sine * dy - scan.origin[0]
             y = cosine * dy - sine * dx - scan.origin[1]
             passed = np.sqrt(x * x + y * y) + PASSED * self.resolution + SPARE
-            # A place is cleared by its nearest beam and both neighbours; which one is nearest may be a matter of rounding.
+            # A place is cleared by its nearest beam and both neighbours; which one is nearest may
+            # be a matter of rounding.
             beams = self._beams_at(scan, x, y) + np.arange(-2, 3)[:, None]
             # Each row by itself: numpy takes wrong values where it has to broadcast them.
             for row in beams.clip(0, count - 1):
@@ -104,7 +116,9 @@ class Costmap:
         return limits
 
     def _mark(self, scan: Scan, estimate: Estimate, roll: float, pitch: float) -> None:
-        """Marks the cells in which beams end, but for those that end on the ground before a tilted robot."""
+        """Marks the cells in which beams end, but for those that end on the ground before a tilted
+        robot.
+        """
         cr = math.cos(roll)
         sr = math.sin(roll)
         cp = math.cos(pitch)
@@ -137,7 +151,9 @@ class Costmap:
         self._places[:2, slots] = places
 
     def _clear(self, scan: Scan, estimate: Estimate, level: bool) -> None:
-        """Clears what is off the map, under the robot or, if the beams are `level`, where they have passed through."""
+        """Clears what is off the map, under the robot or, if the beams are `level`, where they have
+        passed through.
+        """
         (slots,) = self._hit.nonzero()
         spots = self._places.take(slots, axis=1)
         seen = seen_from(estimate)[:2] @ spots
@@ -169,7 +185,9 @@ class Costmap:
         self._keep(slots, spots)
 
     def _beams_at(self, scan: Scan, x: Floats, y: Floats) -> Integers:
-        """The numbers (N,) of the beams nearest to places in the lidar's frame; out of its view there are no such beams."""
+        """The numbers (N,) of the beams nearest to places in the lidar's frame; out of its view
+        there are no such beams.
+        """
         first = scan.angles[0]
         beams = np.arctan2(y, x)
         beams -= first

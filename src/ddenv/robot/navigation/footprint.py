@@ -18,7 +18,8 @@ LEFT = np.array(
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """The robot's outline seen from above: how far it extends from its origin `ahead`, `behind` and to each `side`, m.
+    """The robot's outline seen from above: how far it extends from its origin `ahead`, `behind` and
+    to each `side`, m.
 
     Both sides are taken as equal. Points within `margin` (m) of the outline count as touched.
     """
@@ -45,10 +46,11 @@ class Footprint:
         return float(np.hypot(max(self.ahead, self.behind), self.side))
 
     def apart(self, points: Floats, places: Floats) -> Floats:
-        """A lower bound (K, N) of the distance of `points` from the footprint with its margin, m, at K poses; negative inside.
+        """A lower bound (K, N) of the distance of `points` from the footprint with its margin, m,
+        at K poses; negative inside.
 
-        `points` (3, N) are x, y (m) and 1. `places` (2, K, 3) are matrices that turn such a point into its distance ahead of the
-        robot and to its left, for each pose.
+        `points` (3, N) are x, y (m) and 1. `places` (2, K, 3) are matrices that turn such a point
+        into its distance ahead of the robot and to its left, for each pose.
         """
         beyond = places.reshape(-1, 3) @ points
         count = places.shape[1]
@@ -60,7 +62,9 @@ class Footprint:
 
 
 def seen_from(estimate: Estimate) -> Floats:
-    """The matrix (3, 3) from the estimates' frame to the robot's frame, for points x, y (m) and 1."""
+    """The matrix (3, 3) from the estimates' frame to the robot's frame, for points x, y (m) and
+    1.
+    """
     x = estimate.x
     y = estimate.y
     cosine = math.cos(estimate.heading)
@@ -82,10 +86,12 @@ def legs_beside(
     on: Floats | float,
     side: float,
 ) -> tuple[Booleans, Floats]:
-    """Which of K straight legs are free of `points`, and the distance (m) of the nearest point to each leg; both (K,).
+    """Which of K straight legs are free of `points`, and the distance (m) of the nearest point to
+    each leg; both (K,).
 
-    `points` (N, 2), N > 0, `starts` and `ends` (K, 2) of the legs are in m. A leg is free if no point is within `side` of its line,
-    from `back` before its start to `on` after its end (m; one for all, or (K,)).
+    `points` (N, 2), N > 0, `starts` and `ends` (K, 2) of the legs are in m. A leg is free if no
+    point is within `side` of its line, from `back` before its start to `on` after its end (m; one
+    for all, or (K,)).
     """
     directions = ends - starts
     lengths = np.sqrt((directions * directions).sum(axis=1, keepdims=True))

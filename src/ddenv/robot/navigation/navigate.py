@@ -1,4 +1,6 @@
-"""The controllers `straight` and `costmap`: straight to the goal, or around obstacles with map, plan, pursuit and recovery."""
+"""The controllers `straight` and `costmap`: straight to the goal, or around obstacles with map,
+plan, pursuit and recovery.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,9 @@ LONGEST_TURN = 15.0
 
 
 class Recovery:
-    """Recovery behaviours in turn: clear the map, except near the robot, and look again; back up a little; turn around once on the
-    spot; clear all of the map. Robots move only as long as nothing is in the way.
+    """Recovery behaviours in turn: clear the map, except near the robot, and look again; back up a
+    little; turn around once on the spot; clear all of the map. Robots move only as long as nothing
+    is in the way.
 
     `made` counts the behaviours since the robot last made progress.
     """
@@ -37,7 +40,9 @@ class Recovery:
         self.made = 0
 
     def begin(self, time: float, estimate: Estimate) -> bool:
-        """Begins the next behaviour; False once the scenario's maximum number of recoveries is reached."""
+        """Begins the next behaviour; False once the scenario's maximum number of recoveries is
+        reached.
+        """
         if self.made >= self._most:
             return False
         self.made += 1
@@ -69,12 +74,14 @@ class Recovery:
                 return STOP if time < self._since + LOOK else None
 
 
-# A controller stops when the estimated distance to the goal is within this fraction of its tolerance.
+# A controller stops when the estimated distance to the goal is within this fraction of its
+# tolerance.
 ARRIVED = 0.2
 
 
 class Straight:
-    """Drives straight to the goal by proportional heading control, turning on the spot while the goal lies behind.
+    """Drives straight to the goal by proportional heading control, turning on the spot while the
+    goal lies behind.
 
     Once the pose estimate has reached the goal the robot stays there.
     """
@@ -96,7 +103,8 @@ class Straight:
             return STOP
         error = wrap(math.atan2(dy, dx) - estimate.heading)
         wanted = setup.speed * max(0.0, math.cos(error))
-        # Faster starts lift the front wheels. The robot need not brake gently: it stops well inside the tolerance.
+        # Faster starts lift the front wheels. The robot need not brake gently: it stops well inside
+        # the tolerance.
         self._speed = min(wanted, self._speed + setup.acceleration * setup.period)
         turn = min(max(self._gain * error, -setup.turn_rate), setup.turn_rate)
         return Twist(self._speed, turn)
@@ -109,7 +117,9 @@ ON_THE_SPOT = 4  # turning alone counts as progress for no longer than this many
 
 
 class Progress:
-    """Watches whether the robot still makes progress: since when, from its first look on, it has neither moved nor turned."""
+    """Watches whether the robot still makes progress: since when, from its first look on, it has
+    neither moved nor turned.
+    """
 
     def __init__(self, patience: float) -> None:
         self._patience = patience
@@ -139,17 +149,19 @@ class Progress:
 # The minimum time between two scans that the map takes in, s; and while the robot waits in place.
 LOOK_EVERY = 0.2
 LOOK_WAITING = 0.6
-# The minimum time between two plans, s; after this time without any plan the robot starts a recovery behaviour, s.
+# The minimum time between two plans, s; after this time without any plan the robot starts a
+# recovery behaviour, s.
 THINK_EVERY = 0.5
 THINK = 1.0
-# If the robot cannot follow its plan, it makes no new one within this distance (m) of where it made the last.
+# If the robot cannot follow its plan, it makes no new one within this distance (m) of where it made
+# the last.
 ELSEWHERE = 0.1
 TOO_SHORT = (
     2.0  # a plan that ends at the map's border is renewed when less than this (m) is left of it
 )
 BESIDE = 0.5  # a robot this far (m) off its plan makes a new one
-# The robot keeps its plan if a new one is less than this many times shorter and has no more than this additional room (m), unless
-# the robot is this far (m) off its plan.
+# The robot keeps its plan if a new one is less than this many times shorter and has no more than
+# this additional room (m), unless the robot is this far (m) off its plan.
 LONGER = 1.1
 CLOSER = 0.03
 SWAY = 0.2
@@ -160,7 +172,8 @@ TICK = 1e-6  # clocks that add up periods deviate by less than this, s
 
 
 class Navigator:
-    """Drives to the goal around obstacles, as move_base of ROS does: costmap, global plan, pure pursuit, recovery behaviours.
+    """Drives to the goal around obstacles, as move_base of ROS does: costmap, global plan, pure
+    pursuit, recovery behaviours.
 
     `arrived` and `gave_up` are final: the robot then stays where it is.
     """
@@ -177,7 +190,8 @@ class Navigator:
         self._path: Path | None = None
         self._imu: Imu | None = None
         self._near = self._map.spots
-        # When (s) it looked, planned and found a path last; where, and on which version of the map, it planned.
+        # When (s) it looked, planned and found a path last; where, and on which version of the map,
+        # it planned.
         self._looked = self._planned = -math.inf
         self._found = 0.0
         self._planned_at = setup.start[:2]
@@ -205,7 +219,9 @@ class Navigator:
         return twist
 
     def _look(self, reading: Reading) -> None:
-        """Takes in a scan that is due, collects the points near the robot, and checks whether the path is blocked."""
+        """Takes in a scan that is due, collects the points near the robot, and checks whether the
+        path is blocked.
+        """
         self._imu = reading.imu or self._imu
         every = LOOK_WAITING if self._waits else LOOK_EVERY
         if reading.scan is None or reading.time < self._looked + every - TICK:
@@ -270,7 +286,9 @@ class Navigator:
             self._plan(time, estimate)
 
     def _is_spoilt(self, path: Path) -> bool:
-        """Whether the path is blocked, the robot cannot follow it or has left it, or it soon ends at the map's border."""
+        """Whether the path is blocked, the robot cannot follow it or has left it, or it soon ends
+        at the map's border.
+        """
         if self._blocked or self._follower.stuck or path.off > BESIDE:
             return True
         return not path.final and path.left < TOO_SHORT
@@ -288,7 +306,9 @@ class Navigator:
             self._blocked = False
 
     def _is_as_good(self, other: Path) -> bool:
-        """Whether the present path is hardly worse than `other`: a robot that keeps changing its plan swerves."""
+        """Whether the present path is hardly worse than `other`: a robot that keeps changing its
+        plan swerves.
+        """
         path = self._path
         points = self._map.points
         if path is None or self._is_spoilt(path) or path.off > SWAY or path.final < other.final:

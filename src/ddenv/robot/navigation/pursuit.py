@@ -1,4 +1,6 @@
-"""Pure pursuit of a path: the robot aims at a point ahead on the path, and drives only where its footprint stays free."""
+"""Pure pursuit of a path: the robot aims at a point ahead on the path, and drives only where its
+footprint stays free.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,11 @@ from ddenv.world.pose import Point, wrap
 # Parts of the lookahead distance at which the robot aims; the first one whose arc is free counts.
 PARTS = (1.0, 0.6)
 BRAKE = 1.0  # the deceleration that the robot can rely on, m/s^2
-# At a standstill it aims at this part of the lookahead distance: the slower it is, the closer it keeps to its path.
+# At a standstill it aims at this part of the lookahead distance: the slower it is, the closer it
+# keeps to its path.
 NEAREST = 0.4
-# It turns on the spot when the path leads farther aside than the first angle, until it is within the second, rad.
+# It turns on the spot when the path leads farther aside than the first angle, until it is within
+# the second, rad.
 ASIDE = 0.9
 ALONG = 0.25
 ALIGNED = (
@@ -46,7 +50,9 @@ BACK_UP = np.stack([seen_from(Estimate(-way, 0.0, 0.0))[:2] for way in (0.0, 0.1
 
 
 class Follower:
-    """Follows paths within the limits of `setup`. `stuck` is True if the last step found no free way to move."""
+    """Follows paths within the limits of `setup`. `stuck` is True if the last step found no free
+    way to move.
+    """
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
@@ -65,7 +71,9 @@ class Follower:
         self._turning = self.stuck = False
 
     def step(self, path: Path, estimate: Estimate, points: Floats) -> Twist:
-        """The command to follow `path`. `points` (3, N) near the robot are x, y (m) and 1, in the frame of the estimates."""
+        """The command to follow `path`. `points` (3, N) near the robot are x, y (m) and 1, in the
+        frame of the estimates.
+        """
         path.locate(estimate.x, estimate.y)
         distance, bearing = self._aim(path, estimate, PARTS[0])
         turning = abs(bearing) > (ALONG if self._turning else ASIDE)
@@ -94,7 +102,9 @@ class Follower:
         return self._turn(bearing, estimate, points)
 
     def _aim(self, path: Path, estimate: Estimate, part: float) -> Point:
-        """The distance (m) and the bearing (rad, from straight ahead) of the point that the robot aims at."""
+        """The distance (m) and the bearing (rad, from straight ahead) of the point that the robot
+        aims at.
+        """
         share = NEAREST + (1 - NEAREST) * min(max(estimate.speed / self._fastest, 0.0), 1.0)
         x, y = path.ahead(part * share * self._look_ahead)
         dx = x - estimate.x
@@ -115,7 +125,9 @@ class Follower:
         return Twist(fastest, fastest * bend)
 
     def _turn(self, bearing: float, estimate: Estimate, points: Floats) -> Twist:
-        """Turns on the spot towards `bearing` (rad), the other way round if only that is free, or backs up to make room."""
+        """Turns on the spot towards `bearing` (rad), the other way round if only that is free, or
+        backs up to make room.
+        """
         if abs(bearing) < ALIGNED:
             self.stuck = True
             return STOP
@@ -134,10 +146,12 @@ class Follower:
 
 
 def room(body: Footprint, points: Floats, estimate: Estimate, places: Floats) -> float | None:
-    """The distance (m) that `body` keeps from `points` (3, N) at `places` (2, K, 3), see `Footprint.apart`; None if it touches one.
+    """The distance (m) that `body` keeps from `points` (3, N) at `places` (2, K, 3), see
+    `Footprint.apart`; None if it touches one.
 
-    `places` are relative to the robot at `estimate`; the first one is where it is now. A point within the margin may come a little
-    nearer, so that the robot can turn away from it, but must not be touched, or touched harder.
+    `places` are relative to the robot at `estimate`; the first one is where it is now. A point
+    within the margin may come a little nearer, so that the robot can turn away from it, but must
+    not be touched, or touched harder.
     """
     if not points.shape[1]:
         return ROOM

@@ -1,4 +1,6 @@
-"""The global planner: a path to the goal around the points on the map, by Dijkstra's search on a grid."""
+"""The global planner: a path to the goal around the points on the map, by Dijkstra's search on a
+grid.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +32,9 @@ class Leg:
 class Path:
     """Straight legs between at least two `corners` (x, y in m).
 
-    `final` is True if the path ends at the goal, not at the map's border. `back` and `on` (m) are how much free ground each leg
-    has before its start and after its end. `off` (m) is the robot's distance from the path.
+    `final` is True if the path ends at the goal, not at the map's border. `back` and `on` (m) are
+    how much free ground each leg has before its start and after its end. `off` (m) is the robot's
+    distance from the path.
     """
 
     def __init__(
@@ -64,7 +67,9 @@ class Path:
         return self._rests[self._number] - self._along
 
     def locate(self, x: float, y: float) -> None:
-        """Projects the robot at (x, y) onto the path: it never moves back along it, and reaches the legs in turn."""
+        """Projects the robot at (x, y) onto the path: it never moves back along it, and reaches the
+        legs in turn.
+        """
         self.off = math.inf
         for number in range(self._number, min(self._number + 2, len(self._legs))):
             leg = self._legs[number]
@@ -89,7 +94,9 @@ class Path:
         return leg.x + along * leg.cosine, leg.y + along * leg.sine
 
     def rest(self) -> Floats:
-        """The corners (K, 2) m of what is left of the path, beginning with the robot's projection onto it."""
+        """The corners (K, 2) m of what is left of the path, beginning with the robot's projection
+        onto it.
+        """
         return np.array([self.ahead(0.0), *self.corners[self._number + 1 :]])
 
 
@@ -100,7 +107,9 @@ LONGEST = 1e9  # longer than any path: only what cannot be passed is longer
 
 
 class Grid:
-    """`count` x `count` cells for Dijkstra's search. The cell at column x and row y has the number x * count + y."""
+    """`count` x `count` cells for Dijkstra's search. The cell at column x and row y has the number
+    x * count + y.
+    """
 
     def __init__(self, count: int) -> None:
         self.count = count
@@ -127,9 +136,10 @@ class Grid:
     def search(self, factors: Floats, start: int) -> tuple[Floats, Integers]:
         """Searches the cheapest paths from `start` to all cells.
 
-        Returns their lengths (cells,), in cells and infinite where there is none, and the last cell before each cell (cells,).
-        `factors` (4, cells) multiply the length of a step along x, the first diagonal, y and the second diagonal in each cell: at
-        least 1, infinite where the cell cannot be passed. A step counts with the mean of the factors at its two ends.
+        Returns their lengths (cells,), in cells and infinite where there is none, and the last cell
+        before each cell (cells,). `factors` (4, cells) multiply the length of a step along x, the
+        first diagonal, y and the second diagonal in each cell: at least 1, infinite where the cell
+        cannot be passed. A step counts with the mean of the factors at its two ends.
         """
         flat = factors.ravel()
         self._graph.data = (flat[self._here] + flat[self._there]) * self._lengths
@@ -140,19 +150,24 @@ class Grid:
 
 
 def path_to(cell: int, sources: Integers) -> list[int]:
-    """The cells from the start of a search to `cell`, both included; `sources` are from `Grid.search`."""
+    """The cells from the start of a search to `cell`, both included; `sources` are from
+    `Grid.search`.
+    """
     path = [cell]
     while sources[path[-1]] >= 0:
         path.append(int(sources[path[-1]]))
     return path[::-1]
 
 
-# The search's grid is coarser than the map by this factor. Points keep their exact places, so that no gap is lost.
+# The search's grid is coarser than the map by this factor. Points keep their exact places, so that
+# no gap is lost.
 COARSER = 2
-# The additional cost of a path right beside an obstacle, and how fast it decays with the distance, 1/m.
+# The additional cost of a path right beside an obstacle, and how fast it decays with the distance,
+# 1/m.
 WEIGHT = 4.0
 FALL = 5.0
-# The factor for a direction in which only a shorter robot would fit: the straightened path may fit this one.
+# The factor for a direction in which only a shorter robot would fit: the straightened path may fit
+# this one.
 TIGHT = 1.5
 HEAVY = 50.0  # the factor for blocked cells where the robot already is: it has to get out of there
 APART = 3  # a path can be cut short at corners that are at most this many cells apart
@@ -160,7 +175,8 @@ NEARER = 0.015  # a shortcut may come nearer to an obstacle by this, m
 STRAIGHT = (
     1.03  # a path at most this many times longer than the straight line is not searched again
 )
-# Before and after a narrow place the path goes straight on for the first of these distances (m) that is free.
+# Before and after a narrow place the path goes straight on for the first of these distances (m)
+# that is free.
 STRAIGHT_ON = np.array([0.8, 0.5, 0.25])
 # The sharpest turn there, as the cosine of its angle.
 SHARPEST = -0.3
@@ -170,7 +186,9 @@ DIRECTIONS = tuple(
 
 
 class Planner:
-    """Finds paths on which the robot, aligned with each leg, touches nothing and keeps its `padding` on both sides."""
+    """Finds paths on which the robot, aligned with each leg, touches nothing and keeps its
+    `padding` on both sides.
+    """
 
     def __init__(self, setup: Setup) -> None:
         planner = setup.settings.planner
@@ -194,7 +212,8 @@ class Planner:
         )
 
     def plan(self, points: Floats, x: float, y: float) -> Path | None:
-        """A path from (x, y) to the goal, or to the best place at the map's border if the goal lies beyond; None if there is none.
+        """A path from (x, y) to the goal, or to the best place at the map's border if the goal lies
+        beyond; None if there is none.
 
         It avoids `points` (N, 2). All in m.
         """
@@ -224,14 +243,17 @@ class Planner:
             places[-1] = start
         places[0] = start
         corners = self._cut_short(places, near[route], points)
-        # A place at the map's border only leads to a goal beyond it, however near it is to the goal.
+        # A place at the map's border only leads to a goal beyond it, however near it is to the
+        # goal.
         ahead = np.array(self._goal) - corner
         on_map = bool((ahead > -self._step).all() and (ahead < self._grid.count * self._step).all())
         final = left <= self._tolerance and on_map
         return Path(corners, final=final, back=self._body.inscribed, on=self._body.inscribed)
 
     def room(self, path: Path, points: Floats) -> float | None:
-        """The distance (m) of the nearest of `points` (N, 2) m from what is left of `path`; None if one blocks it."""
+        """The distance (m) of the nearest of `points` (N, 2) m from what is left of `path`; None if
+        one blocks it.
+        """
         rest = path.rest()
         inflation: float = self._inflation
         if not len(points) or len(rest) < 2:
@@ -243,7 +265,9 @@ class Planner:
         return min(float(near.min()), inflation) if free.all() else None
 
     def is_best(self, path: Path, points: Floats) -> bool:
-        """Whether no path can be much better than what is left of `path`: it is free, with room, and nearly straight."""
+        """Whether no path can be much better than what is left of `path`: it is free, with room,
+        and nearly straight.
+        """
         room = self.room(path, points)
         if room is None or room < self._inflation:
             return False
@@ -265,7 +289,9 @@ class Planner:
         return int(self._border[best]) if whole[best] < np.inf else None
 
     def _costs(self, points: Floats) -> tuple[Floats, Floats]:
-        """The factors (4, cells) for `Grid.search`, and the distance of the nearest point to each cell (cells,), m."""
+        """The factors (4, cells) for `Grid.search`, and the distance of the nearest point to each
+        cell (cells,), m.
+        """
         count = self._grid.count
         step = self._step
         widest = max(self._inflation, math.hypot(self._reach, self._side))
@@ -295,9 +321,11 @@ class Planner:
         return factors, nearest
 
     def _cut_short(self, places: Floats, near: Floats, points: Floats) -> list[Point]:
-        """The corners of a path along `places` (K, 2) m that is as free, but straight wherever it can be.
+        """The corners of a path along `places` (K, 2) m that is as free, but straight wherever it
+        can be.
 
-        `near` (K,) m is the distance of the nearest point to each place: no leg comes nearer than what it replaces.
+        `near` (K,) m is the distance of the nearest point to each place: no leg comes nearer than
+        what it replaces.
         """
         turns = np.any(np.diff(places, 2, axis=0).round(6), axis=1)
         kept = np.ones(len(places), dtype=bool)
@@ -317,7 +345,9 @@ class Planner:
         return [(float(x), float(y)) for x, y in self._ease(places[corners], points)]
 
     def _ease(self, corners: Floats, points: Floats) -> Floats:
-        """Moves `corners` (K, 2) m away from narrow places, so that the robot gets there aligned and leaves straight."""
+        """Moves `corners` (K, 2) m away from narrow places, so that the robot gets there aligned
+        and leaves straight.
+        """
         for number in range(1, len(corners) - 1):
             sides = corners[[number - 1, number + 1]]
             here = corners[number]

@@ -1,4 +1,6 @@
-"""The motion of models: boxes around their links, speeds and gaps; when one lies still; how a pile moves by itself."""
+"""The motion of models: boxes around their links, speeds and gaps; when one lies still; how a pile
+moves by itself.
+"""
 
 from __future__ import annotations
 
@@ -24,8 +26,9 @@ NOTHING = -1e6  # half the size of a box around nothing: no other box is ever ne
 class Motion:
     """Where N links are and how fast they move.
 
-    `low` and `high` (N, 3) are the corners of the boxes around the links along the world's axes, m. No point of a link is
-    faster than its `speed` (N,), m/s. `places` (N, 3) m and `turns` (N, 3, 3) are the links' poses in the world frame.
+    `low` and `high` (N, 3) are the corners of the boxes around the links along the world's axes, m.
+    No point of a link is faster than its `speed` (N,), m/s. `places` (N, 3) m and `turns` (N, 3, 3)
+    are the links' poses in the world frame.
     """
 
     low: Floats
@@ -69,8 +72,8 @@ class Motion:
 class Links:
     """All N links of M models, one model after the other; model m begins at link `first[m]`.
 
-    `centers` and `halves` (N, 3) m are the boxes around the links along their own axes, `reach` (N,) m the distance of their
-    farthest corners from the links' origins.
+    `centers` and `halves` (N, 3) m are the boxes around the links along their own axes, `reach`
+    (N,) m the distance of their farthest corners from the links' origins.
     """
 
     bodies: tuple[RigidBody, ...]
@@ -123,7 +126,8 @@ class Links:
     def ways(self, numbers: Sequence[int] | slice, before: Motion, after: Motion) -> Floats:
         """How far (K,) each link's farthest point has moved between two motions, m.
 
-        Over time that is small, unlike `Motion.speed`, for links that only tremble, as boards do that lie across each other.
+        Over time that is small, unlike `Motion.speed`, for links that only tremble, as boards do
+        that lie across each other.
         """
         way = np.linalg.norm(after.places - before.places, axis=1)
         turn = np.linalg.norm(after.turns - before.turns, axis=(1, 2)) / np.sqrt(2.0)
@@ -141,7 +145,8 @@ class Links:
 
 
 def gaps(a: Links, of_a: Motion, b: Links, of_b: Motion) -> Floats:
-    """The gaps (A, B) between the models of `a` and those of `b`, m: along the axis where the gap is widest.
+    """The gaps (A, B) between the models of `a` and those of `b`, m: along the axis where the gap
+    is widest.
 
     Below 0 where boxes overlap.
     """
@@ -153,7 +158,8 @@ def gaps(a: Links, of_a: Motion, b: Links, of_b: Motion) -> Floats:
 
 
 def tight_gaps(a: Links, of_a: Motion, b: Links, of_b: Motion, wanted: Booleans) -> Floats:
-    """As `gaps`, but between boxes along the links' own axes, which lie closer around long models that lie askew.
+    """As `gaps`, but between boxes along the links' own axes, which lie closer around long models
+    that lie askew.
 
     `wanted` (A, B) are the pairs of models that matter: the gaps of all others are infinite.
     """
@@ -183,7 +189,9 @@ def tight_gaps(a: Links, of_a: Motion, b: Links, of_b: Motion, wanted: Booleans)
 
 
 def spread(start: Booleans, joined: Booleans) -> Booleans:
-    """`start` (N,) and all that is connected with it, directly or through others, where `joined` (N, N) is True."""
+    """`start` (N,) and all that is connected with it, directly or through others, where `joined`
+    (N, N) is True.
+    """
     reached = start
     while True:
         wider = reached | joined[:, reached].any(axis=1)
@@ -197,7 +205,9 @@ CALM = 0.3  # s; a model that was slow for this long is at rest
 
 
 class Stillness:
-    """For how long each of M models has stayed where it is, up to the way that something slow makes in that time."""
+    """For how long each of M models has stayed where it is, up to the way that something slow makes
+    in that time.
+    """
 
     def __init__(self, links: Links) -> None:
         self._links = links
@@ -230,9 +240,10 @@ class Stillness:
 class Script:
     """How a pile of K models moves alone, with a row for each tick of the clock.
 
-    `names` are its models in the order of the plant. `states` (T, E) are the pile's positions and velocities in the order of
-    `Hold.entries`; `motions` and `paces` (T of each) are those of its links, paces their mean speeds since the row before, m/s.
-    `resting` (K,) are the models that are at rest after the last row, or have fallen out of the world.
+    `names` are its models in the order of the plant. `states` (T, E) are the pile's positions and
+    velocities in the order of `Hold.entries`; `motions` and `paces` (T of each) are those of its
+    links, paces their mean speeds since the row before, m/s. `resting` (K,) are the models that are
+    at rest after the last row, or have fallen out of the world.
     """
 
     names: Names
@@ -242,7 +253,9 @@ class Script:
     resting: Booleans
 
     def bounds(self) -> Bounds:
-        """The lowest and the highest corner of the box around all that the pile passes through, m."""
+        """The lowest and the highest corner of the box around all that the pile passes through,
+        m.
+        """
         low = np.min([motion.low.min(axis=0) for motion in self.motions], axis=0)
         return low, np.max([motion.high.max(axis=0) for motion in self.motions], axis=0)
 

@@ -1,8 +1,10 @@
-"""How piles move while nobody comes near them, where they come to rest, and which models rest on which.
+"""How piles move while nobody comes near them, where they come to rest, and which models rest on
+which.
 
-A pile that is simulated together with the robot would change the last bits of the robot's motion, even from far away: the
-solver ends its iterations for all contacts of the world at once. So each pile that starts away from the robot is simulated
-alone, and played back until the robot, or something that the robot set in motion, comes near.
+A pile that is simulated together with the robot would change the last bits of the robot's motion,
+even from far away: the solver ends its iterations for all contacts of the world at once. So each
+pile that starts away from the robot is simulated alone, and played back until the robot, or
+something that the robot set in motion, comes near.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ from ddenv.world.extent import model_bounds
 from ddenv.world.model import World, still_links
 from ddenv.world.pose import Pose, vector
 
-# The simulated time of all rehearsals of a world whose models never come to rest, and the minimum for each of them, s.
+# The simulated time of all rehearsals of a world whose models never come to rest, and the minimum
+# for each of them, s.
 BUDGET = 200.0
 LEAST = 1.0
 MEMORY = 200e6  # what the scripts of a world may take in a worker's memory, bytes
@@ -35,7 +38,8 @@ MEMORY = 200e6  # what the scripts of a world may take in a worker's memory, byt
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """`script` of the pile `names` is valid while exactly `present` of the static models `near` are kept.
+    """`script` of the pile `names` is valid while exactly `present` of the static models `near` are
+    kept.
 
     None: the simulation broke.
     """
@@ -47,9 +51,11 @@ class Known:
 
 
 class Repertoire:
-    """The scripts of one world's piles. `moving` is the number of models that can move in the whole of it.
+    """The scripts of one world's piles. `moving` is the number of models that can move in the whole
+    of it.
 
-    They take at most about `MEMORY`: then all go. A script that is rehearsed again is the same to the last bit.
+    They take at most about `MEMORY`: then all go. A script that is rehearsed again is the same to
+    the last bit.
     """
 
     def __init__(self, world: World, moving: int) -> None:
@@ -66,9 +72,11 @@ class Repertoire:
 
     @property
     def ties(self) -> dict[str, frozenset[str]]:
-        """What each model of a pile is tied to: the rest of its pile, and the static models near its motion.
+        """What each model of a pile is tied to: the rest of its pile, and the static models near
+        its motion.
 
-        Without these the pile would move otherwise than in the whole world. Empty while `usual` is unknown.
+        Without these the pile would move otherwise than in the whole world. Empty while `usual` is
+        unknown.
         """
         return {
             name: near.union(names) - {name}
@@ -79,10 +87,12 @@ class Repertoire:
     def unusual(
         self, piles: Iterable[Known], present: frozenset[str], held: frozenset[str]
     ) -> frozenset[str]:
-        """The models of those among `piles` that do not move as in the whole world, and the static ones near them.
+        """The models of those among `piles` that do not move as in the whole world, and the static
+        ones near them.
 
-        `present` are the models that are kept. A pile with one of `held`, which have no twin, counts as well: where such a door was
-        played back while it lay against a falling pile, the robot's last bits were not those without the pile. Why is not known.
+        `present` are the models that are kept. A pile with one of `held`, which have no twin,
+        counts as well: where such a door was played back while it lay against a falling pile, the
+        robot's last bits were not those without the pile. Why is not known.
         """
         usual = self.usual or {}
         other = (
@@ -96,7 +106,9 @@ class Repertoire:
         )
 
     def find(self, names: Names, present: frozenset[str]) -> Known | None:
-        """The script of the pile `names` in a world that keeps the models `present`; None if it has to be rehearsed."""
+        """The script of the pile `names` in a world that keeps the models `present`; None if it has
+        to be rehearsed.
+        """
         for known in self._known.get(names, ()):
             if known.near & present == known.present:
                 return known
@@ -125,9 +137,11 @@ class Repertoire:
         return known
 
 
-# A contact carries where its normal points at least this far up (the cosine of 60 degrees): boards lean on steep edges.
+# A contact carries where its normal points at least this far up (the cosine of 60 degrees): boards
+# lean on steep edges.
 UPWARDS = 0.5
-# How often the contacts are looked at within the last `CALM` seconds: models that tremble do not touch all the time.
+# How often the contacts are looked at within the last `CALM` seconds: models that tremble do not
+# touch all the time.
 LOOKS = 4
 
 
@@ -139,10 +153,12 @@ class Rehearsals:
         self._context = context
         self._plant = context.built.plant
         self._bodies = tuple(context.built.moving.values())
-        # The same for every run in this world, whatever is kept: removing a model must not end the script of another.
+        # The same for every run in this world, whatever is kept: removing a model must not end the
+        # script of another.
         self._longest = max(LEAST, BUDGET / max(repertoire.moving, 1))
         context.hold.reset()
-        # The gaps between all moving models (M, M), and from each to the robot (M,), at the start, m.
+        # The gaps between all moving models (M, M), and from each to the robot (M,), at the start,
+        # m.
         self._apart = np.empty((0, 0))
         self._to_robot = np.empty(0)
         if self._bodies:
@@ -154,7 +170,9 @@ class Rehearsals:
             self._to_robot = gaps(robot, here, links, there)[0]
 
     def learn(self, present: frozenset[str]) -> None:
-        """Lets the repertoire know the piles of the whole world, with the models `present`, which this plant has."""
+        """Lets the repertoire know the piles of the whole world, with the models `present`, which
+        this plant has.
+        """
         if self._repertoire.usual is None:
             self._context.presence.remove(frozenset())
             self._repertoire.usual = {
@@ -162,7 +180,8 @@ class Rehearsals:
             }
 
     def piles(self, kept: Sequence[Body], present: frozenset[str]) -> list[Known]:
-        """All piles of `kept` that start away from the robot, in a world that keeps the models `present`.
+        """All piles of `kept` that start away from the robot, in a world that keeps the models
+        `present`.
 
         Call it after `Presence.remove` of all other models.
         """
@@ -173,7 +192,8 @@ class Rehearsals:
         return self._known(self._piles(numbers, joined, ~near_robot), present)
 
     def _settle(self, present: frozenset[str]) -> list[tuple[tuple[Body, ...], Script | None]]:
-        """All piles of the plant with their scripts, as if there were no robot. None: the simulation broke.
+        """All piles of the plant with their scripts, as if there were no robot. None: the
+        simulation broke.
 
         Piles that come near each other on their way are one pile.
         """
@@ -231,10 +251,11 @@ class Rehearsals:
         )
 
     def supports(self, present: frozenset[str], elements: frozenset[str]) -> list[tuple[str, str]]:
-        """Each of `elements` that can move with each one that it rests on, as (upper, lower), sorted.
+        """Each of `elements` that can move with each one that it rests on, as (upper, lower),
+        sorted.
 
-        `present` are the models of the world. What rests on something that is no element, and so always stays, rests on what that
-        rests on.
+        `present` are the models of the world. What rests on something that is no element, and so
+        always stays, rests on what that rests on.
         """
         hold = self._context.hold
         presence = self._context.presence
@@ -289,7 +310,9 @@ class Rehearsals:
                 below.setdefault(upper, set()).add(lower)
 
     def _meetings(self, settled: Sequence[tuple[tuple[Body, ...], Script | None]]) -> Booleans:
-        """Which moving models (M, M) of two piles come near each other: by the boxes around all that a pile passes through."""
+        """Which moving models (M, M) of two piles come near each other: by the boxes around all
+        that a pile passes through.
+        """
         count = len(self._bodies)
         low = np.full((count, 3), np.inf)
         high = np.full((count, 3), -np.inf)
@@ -313,7 +336,9 @@ class Rehearsals:
     def _piles(
         self, numbers: Sequence[int], joined: Booleans, left: Booleans
     ) -> list[tuple[Body, ...]]:
-        """The moving models `numbers` (K,) in the groups that `joined` (K, K) makes of them; only groups that are `left` (K,)."""
+        """The moving models `numbers` (K,) in the groups that `joined` (K, K) makes of them; only
+        groups that are `left` (K,).
+        """
         left = left.copy()
         piles = []
         while left.any():
@@ -331,7 +356,9 @@ class Rehearsals:
         return piles
 
     def _rehearse(self, pile: tuple[Body, ...], present: frozenset[str]) -> Known:
-        """Simulates the pile alone until all of it rests or its time is up; there is no script if the simulation breaks."""
+        """Simulates the pile alone until all of it rests or its time is up; there is no script if
+        the simulation breaks.
+        """
         context = self._context
         script = None
         margin = NEAR

@@ -1,8 +1,9 @@
 """Which moving models are simulated: those that the robot or something that moves reaches.
 
-All others lie where they are as part of the ground (`Twins`), or are played back from a script (`rehearsal.py`): they cost little,
-do not creep, and change no bit of what does not touch them. So removing a model that takes no part leaves every bit of a run as it
-was. A model at rest wakes by itself, not with its neighbours: by a robot that comes close, by what presses on it, by a support
+All others lie where they are as part of the ground (`Twins`), or are played back from a script
+(`rehearsal.py`): they cost little, do not creep, and change no bit of what does not touch them. So
+removing a model that takes no part leaves every bit of a run as it was. A model at rest wakes by
+itself, not with its neighbours: by a robot that comes close, by what presses on it, by a support
 that goes.
 """
 
@@ -38,12 +39,14 @@ PASSED = 0.02  # m; a robot that has moved less since a model fell asleep beside
 
 
 class Sleep:
-    """The moving models that are kept in one run. Each is awake (simulated), played back from a script, or asleep.
+    """The moving models that are kept in one run. Each is awake (simulated), played back from a
+    script, or asleep.
 
-    Models without a script start awake. With `never` they stay awake. With `alone` the robot waits away from everything.
+    Models without a script start awake. With `never` they stay awake. With `alone` the robot waits
+    away from everything.
 
-    Models that hang on the world, or that touch themselves, have no twin: asleep, they are held and nothing touches them. So they
-    wake and fall asleep with what is near.
+    Models that hang on the world, or that touch themselves, have no twin: asleep, they are held and
+    nothing touches them. So they wake and fall asleep with what is near.
     """
 
     def __init__(
@@ -81,13 +84,15 @@ class Sleep:
         self._real = hold.start.copy()
         self._away: Booleans = np.zeros(len(hold.start), dtype=bool)
         count = len(kept)
-        # Which models are simulated, have fallen out of the world, or still move although their script has ended.
+        # Which models are simulated, have fallen out of the world, or still move although their
+        # script has ended.
         self._awake, self._gone, self._due, self._took_part = np.zeros((4, count), dtype=bool)
         # The number of the script that moves a model, or -1.
         self._played: Integers = np.full(count, -1)
         for number, (_, members) in enumerate(self._scripts):
             self._played[members] = number
-        # Of all L links of the kept models at the last tick, and their mean speeds (L,) since the one before, m/s.
+        # Of all L links of the kept models at the last tick, and their mean speeds (L,) since the
+        # one before, m/s.
         self.motion = Motion.still(len(self._links.bodies))
         self.pace = np.zeros(len(self._links.bodies))
         self._stillness = Stillness(self._links)
@@ -105,7 +110,9 @@ class Sleep:
         hold.apply()
 
     def tick(self, step: int) -> None:
-        """Applies the rules. Call it at each tick of the clock, from the start on; `step` is the plant's step."""
+        """Applies the rules. Call it at each tick of the clock, from the start on; `step` is the
+        plant's step.
+        """
         if self._never:
             self._look(np.arange(len(self._kept)), 0.0)
         elif len(self._kept):
@@ -122,7 +129,9 @@ class Sleep:
         self._now = step
 
     def boxes(self) -> Bounds:
-        """The lowest and the highest corners, (M, 3) m each, of the boxes around the kept models at the last tick."""
+        """The lowest and the highest corners, (M, 3) m each, of the boxes around the kept models at
+        the last tick.
+        """
         low = self.motion.low
         high = self.motion.high
         return np.minimum.reduceat(low, self._links.first), np.maximum.reduceat(
@@ -130,15 +139,17 @@ class Sleep:
         )
 
     def awake_links(self) -> tuple[Floats, Floats, Floats]:
-        """The K links that are simulated, at the last tick: corners (K, 3) m and (K, 3) m of the boxes around them, and bounds of
-        their speeds (K,), m/s.
+        """The K links that are simulated, at the last tick: corners (K, 3) m and (K, 3) m of the
+        boxes around them, and bounds of their speeds (K,), m/s.
         """
         links = self._links.of_models(np.flatnonzero(self._awake))
         return self.motion.low[links], self.motion.high[links], self.motion.speed[links]
 
     @property
     def took_part(self) -> frozenset[str]:
-        """The kept models that were simulated, or were perhaps touched by the robot or by what was."""
+        """The kept models that were simulated, or were perhaps touched by the robot or by what
+        was.
+        """
         return frozenset(body.name for body in self._bodies(self._took_part))
 
     def state(self) -> Floats:
@@ -183,7 +194,9 @@ class Sleep:
                 )
 
     def _hold_still(self, models: Iterable[int]) -> None:
-        """Holds the bodies of `models`: away from everything, or where they are if they have no twin."""
+        """Holds the bodies of `models`: away from everything, or where they are if they have no
+        twin.
+        """
         for number in models:
             entries = self._entries[number]
             self._hold.put(
@@ -213,7 +226,8 @@ class Sleep:
         apart = gaps(self._links, self.motion, self._links, self.motion)
         apart[self._gone] = apart[:, self._gone] = np.inf
         np.fill_diagonal(apart, np.inf)
-        # Pairs (M, M): moved by the same script; near enough to carry each other; near, and one of them is not slow.
+        # Pairs (M, M): moved by the same script; near enough to carry each other; near, and one of
+        # them is not slow.
         together = played[:, None] & (self._played[:, None] == self._played)
         touching: Booleans = apart < TOUCH
         lively: Booleans = moving & ~slow
@@ -221,7 +235,8 @@ class Sleep:
             lively[:, None] | lively
         )
         meeting = (stirring | (touching & (moving[:, None] | moving))) & ~together
-        # What lies as part of the ground can be touched there: only what comes fast wakes it before it does.
+        # What lies as part of the ground can be touched there: only what comes fast wakes it before
+        # it does.
         met: Booleans = meeting.any(axis=1) & ~self._settled | self._struck(apart)
         # Something that is simulated may touch it before the tick after next.
         beside = (
@@ -252,7 +267,9 @@ class Sleep:
         return self._has_twin & self.at_rest & ~self._gone
 
     def _near(self, speed: Floats) -> tuple[Booleans, Booleans]:
-        """Which models the robot may touch, and which it would wake before the tick after next; `speed` (M,) m/s."""
+        """Which models the robot may touch, and which it would wake before the tick after next;
+        `speed` (M,) m/s.
+        """
         robot = self._robot.observe(self._plant, self._context, range(len(self._robot.bodies)))
         # Its wheels turn, but do not come nearer by that.
         margin = (speed + robot.speed[0]) * self._period
@@ -271,7 +288,9 @@ class Sleep:
         return near, close
 
     def _struck(self, apart: Floats) -> Booleans:
-        """Which models (M,) that lie as part of the ground something fast reaches before the tick after next."""
+        """Which models (M,) that lie as part of the ground something fast reaches before the tick
+        after next.
+        """
         pace = np.maximum.reduceat(self.pace, self._links.first)
         reach = CLOSE + pace * self._period
         wanted = self._settled[:, None] & (self._awake & (pace > FAST)) & (apart < reach)
@@ -289,7 +308,8 @@ class Sleep:
             self._away[self._entries[index]] = False
         for number, (_, members) in enumerate(self._scripts):
             if models[members].any() and self._played[members[0]] == number:
-                # Models that the script still moves but that are not woken have fallen out of the world.
+                # Models that the script still moves but that are not woken have fallen out of the
+                # world.
                 self._played[members] = -1
         self._twins.lift(self._bodies(models))
         self._presence.join(self._bodies(models), self._bodies(self._awake))
@@ -320,11 +340,14 @@ class Sleep:
         return [body for body, chosen in zip(self._kept, models, strict=True) if chosen]
 
 
-# A model at rest bears a change of its load up to this many times its own weight: it also carries others.
+# A model at rest bears a change of its load up to this many times its own weight: it also carries
+# others.
 BEARS = 3.0
-# One that a change of its load woke, and that came to rest again where it had lain, bears this many times that change.
+# One that a change of its load woke, and that came to rest again where it had lain, bears this many
+# times that change.
 BORE = 1.5
-# A support carries if it takes this part of the model's weight; the model wakes when half of that is gone.
+# A support carries if it takes this part of the model's weight; the model wakes when half of that
+# is gone.
 CARRIES = 0.1
 LOST = 0.5
 # Loads are means over this time, s: what lies on a point trembles.
@@ -362,7 +385,9 @@ class Loads:
         self._mean = np.zeros((count, count + 1, 3))
 
     def note(self, asleep: Booleans, awake: Booleans) -> None:
-        """Takes the loads of now as those at rest, between each of `asleep` (M,) and of `awake` (M,) that are new to each other."""
+        """Takes the loads of now as those at rest, between each of `asleep` (M,) and of `awake`
+        (M,) that are new to each other.
+        """
         pairs = asleep[:, None] & np.append(awake, True)
         new = pairs & ~self._known
         self._known = pairs
@@ -371,7 +396,9 @@ class Loads:
             self._at_rest[new] = self._mean[new] = now[new]
 
     def changed(self, seconds: float) -> Booleans:
-        """Which models (M,) bear so much more, or are carried so much less, than at rest that they wake."""
+        """Which models (M,) bear so much more, or are carried so much less, than at rest that they
+        wake.
+        """
         self._mean += min(1.0, seconds / SMOOTH) * (self._forces() - self._mean)
         change = np.where(self._known[..., None], self._mean - self._at_rest, 0.0).sum(axis=1)
         before = self._at_rest @ self._up
@@ -381,7 +408,9 @@ class Loads:
         return (self._change > self._bears) | lost.any(axis=1)
 
     def woke(self, models: Booleans, pressed: Booleans) -> None:
-        """Takes in that `models` (M,) woke, those of them that are `pressed` (M,) by a change of their load."""
+        """Takes in that `models` (M,) woke, those of them that are `pressed` (M,) by a change of
+        their load.
+        """
         self._woken_by[models] = np.where(pressed, self._change, 0.0)[models]
 
     def bore(self, models: Booleans) -> None:
@@ -389,7 +418,9 @@ class Loads:
         self._bears[models] = np.maximum(self._bears, BORE * self._woken_by)[models]
 
     def _forces(self) -> Floats:
-        """The force (M, M + 1, 3) on each model at rest from each moving one, N in the world frame."""
+        """The force (M, M + 1, 3) on each model at rest from each moving one, N in the world
+        frame.
+        """
         results = cast(ContactResults, self._port.Eval(self._context))
         forces = np.zeros_like(self._mean)
         for number in range(results.num_point_pair_contacts()):

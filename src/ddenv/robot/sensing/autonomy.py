@@ -1,6 +1,8 @@
-"""The robot's own side of a run: its sensors, its pose estimate, and the commands of its controller.
+"""The robot's own side of a run: its sensors, its pose estimate, and the commands of its
+controller.
 
-Sensors are compass, IMU and wheel odometry, each with its own noise. The estimate is an extended Kalman filter on these three.
+Sensors are compass, IMU and wheel odometry, each with its own noise. The estimate is an extended
+Kalman filter on these three.
 """
 
 from __future__ import annotations
@@ -20,12 +22,14 @@ from ddenv.world.model import Model
 from ddenv.world.pose import wrap
 from ddenv.world.scenario import Scenario, Sensors
 
-# Random numbers drawn at once: drawing them one at a time would cost more than all that is done with them.
+# Random numbers drawn at once: drawing them one at a time would cost more than all that is done
+# with them.
 DRAWN = 256
 
 
 class Truth(NamedTuple):
-    """The robot's true heading, roll and pitch (rad, world frame), and turn rate about its own vertical axis (rad/s).
+    """The robot's true heading, roll and pitch (rad, world frame), and turn rate about its own
+    vertical axis (rad/s).
 
     `wheels` (rad/s) are the wheels' speeds, positive forward.
     """
@@ -44,7 +48,8 @@ def noise(random: np.random.Generator) -> Iterator[float]:
 
 
 class SensorSuite:
-    """The noisy sensors of one run. The same seed gives the same noise; each sensor has its own stream, whatever others measure.
+    """The noisy sensors of one run. The same seed gives the same noise; each sensor has its own
+    stream, whatever others measure.
 
     `lidar` is the random generator for the lidar's noise.
     """
@@ -55,7 +60,8 @@ class SensorSuite:
             np.random.default_rng(each) for each in np.random.SeedSequence(seed).spawn(4)
         )
         self._compass, self._imu, self._odometry = (noise(random) for random in own)
-        # Drawn first, once a run: the compass's misalignment, the gyro's drift, the wear of the tyres.
+        # Drawn first, once a run: the compass's misalignment, the gyro's drift, the wear of the
+        # tyres.
         self._heading_bias = settings.compass_bias * next(self._compass)
         self._rate_bias = settings.gyro_bias * next(self._imu)
         self._scale = 1.0 + settings.odometry_bias * next(self._odometry)
@@ -75,7 +81,9 @@ class SensorSuite:
         )
 
     def odometry(self, wheels: Sequence[float]) -> tuple[float, ...]:
-        """The measured speeds of the wheels, rad/s; a wheel that slips is not distinguished from one that grips."""
+        """The measured speeds of the wheels, rad/s; a wheel that slips is not distinguished from
+        one that grips.
+        """
         scale = self._scale
         spread = self._settings.odometry
         noise = self._odometry
@@ -86,17 +94,20 @@ class SensorSuite:
 SKIDDING = 0.3
 # The standard deviation of a speed that is computed from the wheels, as a part of it: they slip.
 SLIPPING = 0.1
-# Process noise of the heading, rad per square root of a second; it also keeps the gain defined where sensors have no noise.
+# Process noise of the heading, rad per square root of a second; it also keeps the gain defined
+# where sensors have no noise.
 UNSEEN = 0.005
 SMALLEST = 1e-6  # rad
 
 
 class Filter:
-    """The filter of one run. Its state is x, y (m), heading (rad) and the gyro's bias (rad/s); the start is known exactly.
+    """The filter of one run. Its state is x, y (m), heading (rad) and the gyro's bias (rad/s); the
+    start is known exactly.
 
-    The prediction uses the wheels' speeds and the gyro's turn rate. The compass corrects the heading and, through the covariance,
-    also the bias and the position. Nothing else corrects the position, which drifts where wheels slip.
-    It is written in scalars: arrays as small as these would take ten times as long.
+    The prediction uses the wheels' speeds and the gyro's turn rate. The compass corrects the
+    heading and, through the covariance, also the bias and the position. Nothing else corrects the
+    position, which drifts where wheels slip. It is written in scalars: arrays as small as these
+    would take ten times as long.
     """
 
     def __init__(self, x: float, y: float, heading: float, sensors: Sensors) -> None:
@@ -130,7 +141,8 @@ class Filter:
     ) -> None:
         """The prediction: `seconds` pass at the wheels' `speed` (m/s).
 
-        `wheel_rate` and `gyro_rate` (rad/s) are the turn rates from wheels and gyro, `pitch` (rad) is the robot's pitch.
+        `wheel_rate` and `gyro_rate` (rad/s) are the turn rates from wheels and gyro, `pitch` (rad)
+        is the robot's pitch.
         """
         trust = self._trust
         rate = trust * (gyro_rate - self._bias) + (1.0 - trust) * wheel_rate
@@ -228,9 +240,11 @@ def setup_of(robot: Model, drive: Drive, clock: Clock, scenario: Scenario, seed:
 
 
 class Autonomy:
-    """The sensors, the pose filter and the controller of one run. The controller gets measurements, never the truth.
+    """The sensors, the pose filter and the controller of one run. The controller gets measurements,
+    never the truth.
 
-    `arrived` is the time (s) when the controller first reported that the robot is at its goal, None before.
+    `arrived` is the time (s) when the controller first reported that the robot is at its goal, None
+    before.
     """
 
     def __init__(

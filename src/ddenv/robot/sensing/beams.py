@@ -1,8 +1,10 @@
-"""The collision shapes of a world as arrays, and how far the beams of a lidar go until they hit one.
+"""The collision shapes of a world as arrays, and how far the beams of a lidar go until they hit
+one.
 
-Each shape has its own frame, in which it lies between -1 and 1 along each axis: there all boxes are the same cube, and all spheres
-and ellipsoids the same ball. All beams of a scan start in one point and lie in one plane, the x-y plane of the lidar. Each shape is
-tested only with the beams that point towards the box around it.
+Each shape has its own frame, in which it lies between -1 and 1 along each axis: there all boxes are
+the same cube, and all spheres and ellipsoids the same ball. All beams of a scan start in one point
+and lie in one plane, the x-y plane of the lidar. Each shape is tested only with the beams that
+point towards the box around it.
 """
 
 from __future__ import annotations
@@ -49,8 +51,8 @@ KIND_OF = {
 }
 # Where each kind begins in a sorted array of kinds, and where the last one ends.
 BOUNDS = np.arange(len(KINDS) + 1)
-# A shape is skipped only if it is out of the way by at least this margin (m, rad, and as a part of the range), which is far
-# larger than rounding errors.
+# A shape is skipped only if it is out of the way by at least this margin (m, rad, and as a part of
+# the range), which is far larger than rounding errors.
 SPARE = 1e-6
 PLANE = 2e4  # a plane is the top of a cube of this size, m: what lies below it is inside
 THINNEST = 1e-9  # the minimum half thickness of a shape, m
@@ -60,10 +62,12 @@ THINNEST = 1e-9  # the minimum half thickness of a shape, m
 class Shapes:
     """N shapes, sorted by kind, at some instant.
 
-    `centers` (3, N) m are in the world frame. `frames` (3, 3, N) 1/m turn a vector along the world's axes (first index) into one
-    along the shape's own axes (second index), in which the shape lies between -1 and 1. `squares` (3, N) m^2 are the squares of
-    half the sizes, `reaches` (N,) m upper bounds of the distance from the center. `lengths` (N,) are the half lengths of capsules
-    in units of their radius, `facets` the faces of meshes, and the surfaces of terrain, by the number of the shape.
+    `centers` (3, N) m are in the world frame. `frames` (3, 3, N) 1/m turn a vector along the
+    world's axes (first index) into one along the shape's own axes (second index), in which the
+    shape lies between -1 and 1. `squares` (3, N) m^2 are the squares of half the sizes, `reaches`
+    (N,) m upper bounds of the distance from the center. `lengths` (N,) are the half lengths of
+    capsules in units of their radius, `facets` the faces of meshes, and the surfaces of terrain, by
+    the number of the shape.
     """
 
     kinds: Integers
@@ -99,8 +103,9 @@ class Shapes:
 class Obstacles:
     """All N collision shapes of a world, sorted by kind.
 
-    `names` are the world's models, `owners` (N,) the index of each shape's model in `names`. `links` (N,) is the index of the
-    shape's link in its model, -1 for a shape that never moves. `shapes` on moving links are still in their link's frame.
+    `names` are the world's models, `owners` (N,) the index of each shape's model in `names`.
+    `links` (N,) is the index of the shape's link in its model, -1 for a shape that never moves.
+    `shapes` on moving links are still in their link's frame.
     """
 
     names: Names
@@ -152,7 +157,8 @@ def _extent(shape: Shape) -> tuple[Vector, Vector]:
     return vector((low + high) / 2), vector((high - low) / 2)
 
 
-# Added to divisors that may be 0: a beam along a face then crosses it, but far away. It is too small to change anything else.
+# Added to divisors that may be 0: a beam along a face then crosses it, but far away. It is too
+# small to change anything else.
 NEVER = 1e-200
 # In how many steps a beam is followed along terrain.
 FEWEST_STEPS = 20
@@ -163,7 +169,9 @@ Interval = tuple[Floats, Floats]
 
 
 def cube(start: Floats, way: Floats) -> Interval:
-    """The cube from -1 to 1; with fewer than three rows, what lies between -1 and 1 along these axes alone."""
+    """The cube from -1 to 1; with fewer than three rows, what lies between -1 and 1 along these
+    axes alone.
+    """
     metres = 1.0 / (way + NEVER)
     middle = start * metres
     half = np.abs(metres)
@@ -220,10 +228,11 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Facets:
-    """A convex mesh as the intersection of the half spaces behind its faces, in the frame in which it lies between -1 and 1.
+    """A convex mesh as the intersection of the half spaces behind its faces, in the frame in which
+    it lies between -1 and 1.
 
-    `corners` (3, V) are its vertices, `faces` (3, M) indices of vertices. A point p is behind face m if
-    `normals[:, m] @ p <= offsets[m]`; `normals` (3, M), `offsets` (M,).
+    `corners` (3, V) are its vertices, `faces` (3, M) indices of vertices. A point p is behind face
+    m if `normals[:, m] @ p <= offsets[m]`; `normals` (3, M), `offsets` (M,).
     """
 
     corners: Floats
@@ -233,7 +242,9 @@ class Facets:
 
     @classmethod
     def of(cls, mesh: Mesh, middle: Floats, half: Floats) -> Facets:
-        """The facets of `mesh`, whose box has its centre at `middle` (3,) m and half the size `half` (3,) m."""
+        """The facets of `mesh`, whose box has its centre at `middle` (3,) m and half the size
+        `half` (3,) m.
+        """
         corners = (mesh.vertices - middle) / half
         start, second, third = (corners[mesh.faces[:, number]] for number in range(3))
         normals = np.cross(second - start, third - start)
@@ -245,7 +256,9 @@ class Facets:
         return cls(corners.T.copy(), faces.T.copy(), normals.T.copy(), offsets)
 
     def cast(self, start: Floats, way: Floats, normal: Floats, _range: float) -> Interval:
-        """Where beams from `start` (3,) along `way` (3, P), orthogonal to `normal` (3,), enter and leave."""
+        """Where beams from `start` (3,) along `way` (3, P), orthogonal to `normal` (3,), enter and
+        leave.
+        """
         corners = self.corners - start[:, None]
         heights = (normal[0] * corners[0] + normal[1] * corners[1] + normal[2] * corners[2])[
             self.faces
@@ -263,21 +276,27 @@ class Facets:
 
 @dataclass(frozen=True)
 class Relief:
-    """Terrain in the frame in which it lies between -1 and 1: all that is below `heights` (R, C). Its cells are `cell` m wide."""
+    """Terrain in the frame in which it lies between -1 and 1: all that is below `heights` (R, C).
+    Its cells are `cell` m wide.
+    """
 
     heights: Floats
     cell: float
 
     @classmethod
     def of(cls, terrain: Terrain, middle: Floats, half: Floats) -> Relief:
-        """The relief of terrain, whose box has its centre at `middle` (3,) m and half the size `half` (3,) m."""
+        """The relief of terrain, whose box has its centre at `middle` (3,) m and half the size
+        `half` (3,) m.
+        """
         counts = np.array(terrain.heights.shape[::-1]) - 1
         return cls(
             (terrain.heights - middle[2]) / half[2], float((np.array(terrain.size) / counts).min())
         )
 
     def cast(self, start: Floats, way: Floats, _normal: Floats, reach: float) -> Interval:
-        """Where beams from `start` (3,) along `way` (3, P), which are `reach` m long, meet the surface; they do not leave it."""
+        """Where beams from `start` (3,) along `way` (3, P), which are `reach` m long, meet the
+        surface; they do not leave it.
+        """
         along = np.linspace(0.0, reach, int(np.clip(reach / self.cell, FEWEST_STEPS, MOST_STEPS)))
         x, y, z = start[:, None, None] + along[:, None] * way[:, None]
         rows, columns = self.heights.shape
@@ -288,7 +307,8 @@ class Relief:
         before = above[first - 1, beam]
         after = above[first, beam]
         enter = along[first] - along[1] * after / (after - before + NEVER)
-        # A beam that begins below the surface does not meet it, nor does one that comes from below the terrain's edge.
+        # A beam that begins below the surface does not meet it, nor does one that comes from below
+        # the terrain's edge.
         met = under.any(axis=0) & (before > 0)
         return np.where(met, enter, np.inf), np.where(met, np.inf, -np.inf)
 
@@ -303,7 +323,9 @@ TURNS = np.array(
 
 @dataclass(frozen=True, kw_only=True)
 class Fan:
-    """The B beams of a lidar: `angles` (B,) rad, their `cosines` and `sines` (B,), `step` rad between two, `range` m long."""
+    """The B beams of a lidar: `angles` (B,) rad, their `cosines` and `sines` (B,), `step` rad
+    between two, `range` m long.
+    """
 
     angles: Floats
     cosines: Floats
@@ -321,7 +343,9 @@ class Fan:
         return cls(angles=shared, cosines=cosines, sines=sines, step=step, range=settings.range)
 
     def between(self, middle: Floats, half: Floats) -> tuple[Integers, Integers]:
-        """The beams within `half` (K,) rad of the angles `middle` (K,) rad: how many for each (K,), and the numbers of all (P,)."""
+        """The beams within `half` (K,) rad of the angles `middle` (K,) rad: how many for each (K,),
+        and the numbers of all (P,).
+        """
         number = (middle - self.angles[0] + TURNS) / self.step
         width = half / self.step
         first = np.maximum(np.ceil(number - width), 0.0).astype(int).T.ravel()
@@ -335,10 +359,12 @@ class Fan:
 def cast(
     fan: Fan, shapes: Shapes, origin: Floats, axes: Floats
 ) -> tuple[Floats, Integers, Integers]:
-    """Casts the beams of one scan from `origin` (3,) m, in the world frame; `axes` (3, 3) are the lidar's axes, as rows.
+    """Casts the beams of one scan from `origin` (3,) m, in the world frame; `axes` (3, 3) are the
+    lidar's axes, as rows.
 
-    Returns how far the beams go, (B,) m, infinite where they hit nothing; the numbers (N,) of the beams that end on a shape; and
-    those of the shapes (N,). Angles count from the first axis towards the second. A beam does not hit a shape that it starts in.
+    Returns how far the beams go, (B,) m, infinite where they hit nothing; the numbers (N,) of the
+    beams that end on a shape; and those of the shapes (N,). Angles count from the first axis
+    towards the second. A beam does not hit a shape that it starts in.
     """
     # The lidar's position and its three axes in the frame of each shape, (4, 3, K).
     view = np.empty((4, 3, len(shapes.kinds)))
@@ -346,7 +372,8 @@ def cast(
     view[1:] = axes[:, :, None]
     frames = shapes.frames
     local: Floats = view[:, :1] * frames[0] + view[:, 1:2] * frames[1] + view[:, 2:] * frames[2]
-    # Half the edges of the boxes around the shapes, and their centers, along the lidar's first two axes.
+    # Half the edges of the boxes around the shapes, and their centers, along the lidar's first two
+    # axes.
     edges = local[1:3] * shapes.squares
     centers = (edges * local[0]).sum(axis=1)
     counts, beams = fan.between(*_span(-centers, edges))
@@ -363,10 +390,11 @@ def cast(
 
 
 def _span(centers: Floats, edges: Floats) -> tuple[Floats, Floats]:
-    """The angles at which boxes are seen from the origin: the middle and half the width, (K,) rad each.
+    """The angles at which boxes are seen from the origin: the middle and half the width, (K,) rad
+    each.
 
-    Along the lidar's axes, `centers` (3, K) m are the boxes' centers, and `edges` (3, 3, K) m half their edges, one for each of the
-    box's axes (second index).
+    Along the lidar's axes, `centers` (3, K) m are the boxes' centers, and `edges` (3, 3, K) m half
+    their edges, one for each of the box's axes (second index).
     """
     distance = np.sqrt(centers[0] * centers[0] + centers[1] * centers[1])
     x, y = centers[:2] / np.maximum(distance, SPARE)
@@ -377,7 +405,9 @@ def _span(centers: Floats, edges: Floats) -> tuple[Floats, Floats]:
 
 
 def _cross(fan: Fan, shapes: Shapes, local: Floats, counts: Integers, beams: Integers) -> Interval:
-    """Where `beams` (P,) enter and leave the shapes; `counts` (K,) says how many of the beams belong to each shape, in order."""
+    """Where `beams` (P,) enter and leave the shapes; `counts` (K,) says how many of the beams
+    belong to each shape, in order.
+    """
     start, ahead, left = local[:3].repeat(counts, axis=2)
     # In place: the system gives large new arrays slowly.
     ahead *= fan.cosines.take(beams)

@@ -18,15 +18,16 @@ from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector
 
 DRAWS = 2**40  # random numbers reserved for the noise of each scan
-# Of a scan: its ranges, what its beams measured, also too near or too far, (B,) m each; the beams (H,) that ended on models (H,).
+# Of a scan: its ranges, what its beams measured, also too near or too far, (B,) m each; the beams
+# (H,) that ended on models (H,).
 Measured = tuple[Floats, Floats, Integers, Integers]
 
 
 class Lidar:
     """Measures the distances to the kept models of a world, never to the robot itself.
 
-    `present` are the names of the kept models, `moving` the ones among them that move. `first_seen` has the time (s) when a beam
-    first ended on each model, including grounds.
+    `present` are the names of the kept models, `moving` the ones among them that move. `first_seen`
+    has the time (s) when a beam first ended on each model, including grounds.
     """
 
     def __init__(
@@ -66,7 +67,9 @@ class Lidar:
 
     @property
     def took_part(self) -> dict[str, float]:
-        """The models without which a scan that was read would be another, each with the time (s) of the first one."""
+        """The models without which a scan that was read would be another, each with the time (s) of
+        the first one.
+        """
         return {
             name: at
             for name, at in zip(self._names, self._read.tolist(), strict=True)
@@ -76,8 +79,8 @@ class Lidar:
     def scan(self, now: float, pose: PoseRow, places: Floats, turns: Floats) -> Scan:
         """The scan at the time `now` (s).
 
-        `pose` is the pose of the robot's first link; `places` (L, 3) m and `turns` (L, 3, 3) are the poses of all links of the
-        moving models, model after model. All are in the world frame.
+        `pose` is the pose of the robot's first link; `places` (L, 3) m and `turns` (L, 3, 3) are
+        the poses of all links of the moving models, model after model. All are in the world frame.
         """
         place = Pose(pose[:3], pose[3:]) @ self._mount
         self._move(places, turns)
@@ -102,7 +105,8 @@ class Lidar:
         """The ranges of the scan at `now` (s), infinite where they exceed `limits` (B,) m."""
         ranges, measured, beams, owners = measure()
         if limits is not None:
-            # Behind a hit that is too far the next one is farther, with the same noise: that would not be seen either.
+            # Behind a hit that is too far the next one is farther, with the same noise: that would
+            # not be seen either.
             near: Booleans = measured <= limits
             ranges = np.where(near, ranges, np.inf)
             owners = owners[near[beams]]
@@ -110,11 +114,14 @@ class Lidar:
         return ranges
 
     def _measure(self, number: int, place: Pose, shapes: Shapes, models: Integers) -> Measured:
-        """Makes scan `number` from `place`; its beams may hit the `shapes` (K,) of these `models` (K,)."""
+        """Makes scan `number` from `place`; its beams may hit the `shapes` (K,) of these `models`
+        (K,).
+        """
         distances, beams, hit = cast(
             self._fan, shapes, np.array(place.position), place.rotation().T
         )
-        # The errors of the ranges are the same whatever the beams hit, and whichever scans are computed.
+        # The errors of the ranges are the same whatever the beams hit, and whichever scans are
+        # computed.
         bits: Any = self._random.bit_generator
         bits.state = self._state
         bits.advance(number * DRAWS)
@@ -138,7 +145,9 @@ class Lidar:
 
 
 class LazyScan(Scan):
-    """A scan that computes its `ranges` only when they are read. `dataclasses.replace` makes copies whose ranges are an array."""
+    """A scan that computes its `ranges` only when they are read. `dataclasses.replace` makes copies
+    whose ranges are an array.
+    """
 
     __slots__ = ("_ranges",)
     _ranges: Callable[..., Floats] | Floats
@@ -167,7 +176,8 @@ def in_the_way(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> Intege
 
     `axes` (3, 3) are the lidar's axes, as rows; the beams lie in the plane of the first two.
     """
-    # A matrix product may round differently among more shapes: nothing else is computed from this one.
+    # A matrix product may round differently among more shapes: nothing else is computed from this
+    # one.
     ahead, left, above = axes @ (shapes.centers - origin[:, None])
     far = shapes.reaches + fan.range
     numbers: Integers = (
@@ -177,10 +187,12 @@ def in_the_way(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats) -> Intege
     away = origin[:, None] - shapes.centers.take(numbers, axis=1)
     local = (away[:, None] * frames).sum(axis=0)
     up = (axes[2][:, None, None] * frames).sum(axis=0)
-    # Half the edges of the boxes around the shapes, and their centers, along the lidar's vertical axis.
+    # Half the edges of the boxes around the shapes, and their centers, along the lidar's vertical
+    # axis.
     edges = up * shapes.squares.take(numbers, axis=1)
     cut = np.abs((edges * local).sum(axis=0)) <= np.abs(edges).sum(axis=0) + SPARE
-    # How far the beams get along each of a shape's axes: a ground may be at the right height, but beyond their range.
+    # How far the beams get along each of a shape's axes: a ground may be at the right height, but
+    # beyond their range.
     extents = np.sqrt(np.maximum((frames * frames).sum(axis=0) - up * up, 0.0))
     met: Booleans = cut & (
         np.abs(local) - 1.0 <= extents * (fan.range * (1.0 + SPARE)) + SPARE

@@ -19,7 +19,9 @@ from ddenv.world.scenario import Sensors
 
 
 class Notice:
-    """The models that the robot notices in one run. `first_touched` maps a model to the time (s) when it was first touched."""
+    """The models that the robot notices in one run. `first_touched` maps a model to the time (s)
+    when it was first touched.
+    """
 
     def __init__(
         self,
@@ -30,8 +32,8 @@ class Notice:
         kept: Sequence[Body],
         present: frozenset[str],
     ) -> None:
-        """`boxes` are those of `still_boxes`. `present` are the models that are kept, `kept` the moving ones among them, in the
-        order of `sleep`.
+        """`boxes` are those of `still_boxes`. `present` are the models that are kept, `kept` the
+        moving ones among them, in the order of `sleep`.
         """
         self.first_touched: dict[str, float] = {}
         self._first_seen: dict[str, float] = {}
@@ -55,8 +57,9 @@ class Notice:
     def feel(self, now: float) -> None:
         """Notes what the robot touches at the time `now` (s).
 
-        Call it after the motors got their command: then Drake computes the contacts that the next step needs in any case, once and
-        with the same bits. Contacts that begin and end between two calls are missed.
+        Call it after the motors got their command: then Drake computes the contacts that the next
+        step needs in any case, once and with the same bits. Contacts that begin and end between two
+        calls are missed.
         """
         try:
             results: Any = self._contacts.Eval(self._context)
@@ -70,7 +73,8 @@ class Notice:
             if name is None:
                 name = self._owners.get(other.get_value())
                 other = pair.id_A
-            # Most contacts are with the ground that the robot stands on: they fail the cheaper checks, which come first.
+            # Most contacts are with the ground that the robot stands on: they fail the cheaper
+            # checks, which come first.
             if (
                 name is not None
                 and name not in self.first_touched
@@ -79,7 +83,9 @@ class Notice:
                 self.first_touched[name] = now
 
     def look(self, now: float, place: Vector, heading: float) -> None:
-        """Notes what is in view at the time `now` (s) from `place` (m), in the direction `heading` (rad)."""
+        """Notes what is in view at the time `now` (s) from `place` (m), in the direction `heading`
+        (rad).
+        """
         sensors = self._sensors
         unseen = self._unseen
         if not (sensors.view_range and unseen.any()):
@@ -97,7 +103,9 @@ class Notice:
             self._unseen &= self._names != name
 
     def first_sensed(self, measured: Mapping[str, float]) -> dict[str, float]:
-        """When (s) each model was first in view or touched, in order of time; `measured` is when the lidar first hit it."""
+        """When (s) each model was first in view or touched, in order of time; `measured` is when
+        the lidar first hit it.
+        """
         first = dict(self.first_touched)
         for found in (measured, self._first_seen):
             for name, time in found.items():
@@ -105,18 +113,20 @@ class Notice:
         return dict(sorted(first.items(), key=lambda item: item[1]))
 
 
-# The least component of a direction along an axis: a ray along the other axis then still crosses, far away.
+# The least component of a direction along an axis: a ray along the other axis then still crosses,
+# far away.
 PARALLEL = 1e-12
 
 
 def in_view(
     low: Floats, high: Floats, eye: Floats, heading: Floats, view_range: float, view_angle: float
 ) -> Booleans:
-    """Which boxes (...) are partly in view of `eye`: within `view_range` (m) and, seen from above, in the field of view.
+    """Which boxes (...) are partly in view of `eye`: within `view_range` (m) and, seen from above,
+    in the field of view.
 
-    `low` and `high` (..., 3) m are the boxes' corners, `eye` (..., 3) m is the viewpoint and `heading` (...) rad the middle of the
-    field of view, all in the world frame; `view_angle` (rad) is its full width. A box above, below or around `eye` is always in
-    the field of view.
+    `low` and `high` (..., 3) m are the boxes' corners, `eye` (..., 3) m is the viewpoint and
+    `heading` (...) rad the middle of the field of view, all in the world frame; `view_angle` (rad)
+    is its full width. A box above, below or around `eye` is always in the field of view.
     """
     apart = np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0.0), axis=-1)
     seen: Booleans = np.asarray(apart <= view_range)
@@ -129,7 +139,8 @@ def in_view(
     drop = np.maximum(np.maximum(low[:, 2], -high[:, 2]), 0.0)
     x, y = np.clip(0.0, low[:, :2], high[:, :2]).T
     offset = np.arctan2(y, x) - heading
-    # The nearest visible point is the nearest point of the whole box, or lies on an edge of the field of view.
+    # The nearest visible point is the nearest point of the whole box, or lies on an edge of the
+    # field of view.
     shown = np.abs(offset - math.tau * np.round(offset / math.tau)) <= view_angle / 2
     shown |= (x == 0) & (y == 0)
     for edge in (heading - view_angle / 2, heading + view_angle / 2):
@@ -139,7 +150,9 @@ def in_view(
 
 
 def _entry(low: Floats, high: Floats, direction: Floats) -> Floats:
-    """The distance (N,) along `direction` (N,) rad from the origin to rectangles (N, 2), m; infinite where the ray misses."""
+    """The distance (N,) along `direction` (N,) rad from the origin to rectangles (N, 2), m;
+    infinite where the ray misses.
+    """
     ray = np.column_stack([np.cos(direction), np.sin(direction)])
     ray = np.where(np.abs(ray) < PARALLEL, PARALLEL, ray)
     enter = np.maximum(np.minimum(low / ray, high / ray).max(axis=1), 0.0)

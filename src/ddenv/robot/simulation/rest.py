@@ -1,4 +1,6 @@
-"""When a run may end early: its controller has stopped, and the robot rests well inside or outside epsilon."""
+"""When a run may end early: its controller has stopped, and the robot rests well inside or outside
+epsilon.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +14,17 @@ from ddenv.world.scenario import Goal
 SLOW = 0.02
 # A robot has to be still for this time (s) before its run may end.
 SECONDS = 2.0
-# A still robot may slide this far (m) besides what it has slid since it became still, going on as if it fell: on a slippery slope
-# it does.
+# A still robot may slide this far (m) besides what it has slid since it became still, going on as
+# if it fell: on a slippery slope it does.
 NUDGE = 0.01
 
 
 class Rest:
     """Decides for one run whether it may end before its time is up, at `until` (s).
 
-    Resting is not enough: robots that stood with stalled wheels for 8 s came free, since the noise of a sensor changed what
-    their controller wanted. So the run goes on until its controller has stopped for good.
+    Resting is not enough: robots that stood with stalled wheels for 8 s came free, since the noise
+    of a sensor changed what their controller wanted. So the run goes on until its controller has
+    stopped for good.
     """
 
     def __init__(self, ends: Ends, goal: Goal, until: float) -> None:
@@ -34,7 +37,8 @@ class Rest:
         self._slid = 0.0
 
     def update(self, now: float, place: Vector, still: bool) -> bool:
-        """Whether the run may end at `now` (s), with the robot at `place` (m). Call it for each recorded pose, in order of time.
+        """Whether the run may end at `now` (s), with the robot at `place` (m). Call it for each
+        recorded pose, in order of time.
 
         `still`: the controller has stopped for good, and nothing in the world moves.
         """

@@ -1,4 +1,6 @@
-"""One run: simulate, sense, estimate and command until the goal is reached, time is up, or something breaks."""
+"""One run: simulate, sense, estimate and command until the goal is reached, time is up, or
+something breaks.
+"""
 
 from __future__ import annotations
 
@@ -39,9 +41,9 @@ End = tuple[str, str, bool]
 class Run:
     """One run in a prepared context: start poses are set, removed models are switched off.
 
-    No part of the robot is farther than `reach` (m) from its first link. `kept` are the moving models whose motion is recorded.
-    With `rest` the run is cut short once the robot is at rest for good. Without `reached` it stays unknown who took part;
-    `unusual` take part in any case.
+    No part of the robot is farther than `reach` (m) from its first link. `kept` are the moving
+    models whose motion is recorded. With `rest` the run is cut short once the robot is at rest for
+    good. Without `reached` it stays unknown who took part; `unusual` take part in any case.
     """
 
     context: RunContext
@@ -63,7 +65,8 @@ class Run:
         plant = built.plant
         base = built.robot.base
         motors = plant.get_desired_state_input_port(built.robot.instance)
-        # The motors ignore the wheels' desired positions, which come first, and follow their desired speeds.
+        # The motors ignore the wheels' desired positions, which come first, and follow their
+        # desired speeds.
         self._commanded = np.zeros(motors.size())
         self._motors = motors.FixValue(self.context.plant_context, self._commanded)
         self._place = base.floating_positions_start()
@@ -79,7 +82,8 @@ class Run:
         self._wall_clock = Stopwatch(LONGEST_LOOK)
 
     def execute(self, progress: Progress | None) -> RunResult:
-        """Runs to the end. What breaks in the simulation becomes a result; what `progress` raises is passed on.
+        """Runs to the end. What breaks in the simulation becomes a result; what `progress` raises
+        is passed on.
 
         Raises LeftRegion if the plant lacks what comes near.
         """
@@ -97,8 +101,8 @@ class Run:
         if self.reached and outcome != "error":
             read = self.lidar.took_part if self.lidar else {}
             took_part = self.reached.names | self.sleep.took_part | read.keys() | self.unusual
-            # In scans that nobody reads, a model that does not affect the run may hide one that does: only scans that were read
-            # give the same times in smaller worlds.
+            # In scans that nobody reads, a model that does not affect the run may hide one that
+            # does: only scans that were read give the same times in smaller worlds.
             seen = {name: at for name, at in seen.items() if name not in took_part} | read
         return RunResult(
             outcome=outcome,
@@ -168,7 +172,9 @@ class Run:
         return None
 
     def _is_still(self) -> bool:
-        """Whether the controller has stopped for good, and no joint, no wheel and no model moves."""
+        """Whether the controller has stopped for good, and no joint, no wheel and no model
+        moves.
+        """
         if not self.autonomy.is_over or self.sleep.pace.max(initial=0.0) > SLOW:
             return False
         speeds = self._state[self.context.built.plant.num_positions() :]
@@ -188,7 +194,9 @@ class Run:
         return "" if self._look() else "not-finite"
 
     def _unsolved(self) -> str:
-        """What to say where the solver finds no contact forces: it fails where masses differ too much."""
+        """What to say where the solver finds no contact forces: it fails where masses differ too
+        much.
+        """
         problem = "Drake found no contact forces; a smaller simulation.time_step may help"
         if not self.kept:
             return problem
@@ -198,7 +206,9 @@ class Run:
         )
 
     def _command(self, tick: Tick) -> End | None:
-        """Sets the wheel speeds that the controller wants. Returns how the run ends if the controller fails."""
+        """Sets the wheel speeds that the controller wants. Returns how the run ends if the
+        controller fails.
+        """
         try:
             speeds = self.drive.wheel_speeds(
                 self.autonomy.command(tick), self.scenario.controller.skid
@@ -219,7 +229,9 @@ class Run:
         return math.isfinite(sum(self._state))
 
     def _pose(self, body: Body) -> PoseRow:
-        """The pose of a model's first link in the world frame, as of the last look: x, y, z (m), qw, qx, qy, qz."""
+        """The pose of a model's first link in the world frame, as of the last look: x, y, z (m),
+        qw, qx, qy, qz.
+        """
         if body.base.is_floating_base_body():
             return self._floating(body.base.floating_positions_start())
         place = self.context.built.plant.EvalBodyPoseInWorld(self.context.plant_context, body.base)
@@ -228,7 +240,8 @@ class Run:
         return x, y, z, qw, qx, qy, qz
 
     def _floating(self, start: int) -> PoseRow:
-        # The plant's own quaternion: continuous, never jumping to its negative, but not exactly of unit length.
+        # The plant's own quaternion: continuous, never jumping to its negative, but not exactly of
+        # unit length.
         qw, qx, qy, qz, x, y, z = self._state[start : start + 7]
         length = math.hypot(qw, qx, qy, qz)
         return x, y, z, qw / length, qx / length, qy / length, qz / length
@@ -237,7 +250,8 @@ class Run:
         """What the robot's sensors would measure without noise at its `pose`."""
         qw, qx, qy, qz = pose[3:]
         roll, pitch, heading = Pose(pose[:3], pose[3:]).rpy()
-        # The gyro is fixed to the body: it measures the rotation about the body's own z axis, here in the world frame.
+        # The gyro is fixed to the body: it measures the rotation about the body's own z axis, here
+        # in the world frame.
         up_x = 2 * (qx * qz + qw * qy)
         up_y = 2 * (qy * qz - qw * qx)
         up_z = 1 - 2 * (qx * qx + qy * qy)

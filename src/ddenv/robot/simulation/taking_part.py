@@ -1,8 +1,10 @@
-"""Which models can have changed a bit of a run: those without which the same run might go otherwise.
+"""Which models can have changed a bit of a run: those without which the same run might go
+otherwise.
 
-Whatever nothing comes near changes no bit. So a model takes part if the robot or a model that is simulated may have touched it
-between two ticks, if a beam of a scan that the controller read ended on it, if it was simulated itself, or if it belongs to a pile
-that does not move as in the whole world. That is more than what touched, and never less.
+Whatever nothing comes near changes no bit. So a model takes part if the robot or a model that is
+simulated may have touched it between two ticks, if a beam of a scan that the controller read ended
+on it, if it was simulated itself, or if it belongs to a pile that does not move as in the whole
+world. That is more than what touched, and never less.
 """
 
 from __future__ import annotations
@@ -20,12 +22,15 @@ from ddenv.world.extent import Bounds, bounds, shape_bounds, stacked
 from ddenv.world.model import Joint, Model, World, held_with, still_links
 from ddenv.world.pose import Pose, angle_between
 
-# What happens between two ticks besides motion at the speed at one of them, m: half of g t^2 for t = 0.1 s.
+# What happens between two ticks besides motion at the speed at one of them, m: half of g t^2 for t
+# = 0.1 s.
 SLACK = 0.05
 
 
 def solids(world: World) -> dict[str, Bounds]:
-    """The boxes around the S shapes of each model that never move: corners (S, 3) m and (S, 3) m. There are no planes."""
+    """The boxes around the S shapes of each model that never move: corners (S, 3) m and (S, 3) m.
+    There are no planes.
+    """
     shapes = {
         model.name: [one for link in still_links(model) for one in link.collisions]
         for model in world.models
@@ -38,10 +43,11 @@ def solids(world: World) -> dict[str, Bounds]:
 
 
 class Reached:
-    """The models that never move which the robot, or a model that is simulated, may have touched in one run.
+    """The models that never move which the robot, or a model that is simulated, may have touched in
+    one run.
 
-    `boxes` are `solids`, `hull` is the robot's; `present` are the models that are kept. No two ticks are more than `period` (s)
-    apart.
+    `boxes` are `solids`, `hull` is the robot's; `present` are the models that are kept. No two
+    ticks are more than `period` (s) apart.
     """
 
     def __init__(
@@ -79,7 +85,9 @@ class Reached:
         return frozenset(self._names[self._found])
 
     def look(self, pose: PoseRow, speed: float) -> None:
-        """Call it at each tick: the robot's first link is at `pose`, and no part of the robot is faster than `speed` (m/s)."""
+        """Call it at each tick: the robot's first link is at `pose`, and no part of the robot is
+        faster than `speed` (m/s).
+        """
         if not len(self._owners):
             return
         margin = SLACK + speed * self._period
@@ -126,7 +134,9 @@ class Reached:
 
 
 def _moved(one: PoseRow, other: PoseRow, reach: float) -> float:
-    """How far any point within `reach` (m) of the origin can have moved between two poses of it, m."""
+    """How far any point within `reach` (m) of the origin can have moved between two poses of
+    it, m.
+    """
     return math.dist(one[:3], other[:3]) + angle_between(one[3:], other[3:]) * reach
 
 
@@ -135,10 +145,11 @@ ENDLESS = 1e9  # m; half of a box that holds the world
 
 @dataclass(frozen=True)
 class Hull:
-    """B boxes in the frame of the robot's first link, with `centers` and `halves` (B, 3) m: the robot is always inside them.
+    """B boxes in the frame of the robot's first link, with `centers` and `halves` (B, 3) m: the
+    robot is always inside them.
 
-    No point of a box is farther than `reach` (m) from the frame's origin. A robot with loose parts or with unlimited sliding
-    joints has a box of `ENDLESS` (m).
+    No point of a box is farther than `reach` (m) from the frame's origin. A robot with loose parts
+    or with unlimited sliding joints has a box of `ENDLESS` (m).
     """
 
     centers: Floats
@@ -157,7 +168,9 @@ class Hull:
         )
 
     def bounds(self, place: Pose) -> Bounds:
-        """The corners (B, 3) m and (B, 3) m of boxes along the world's axes around the boxes, with the first link at `place`."""
+        """The corners (B, 3) m and (B, 3) m of boxes along the world's axes around the boxes, with
+        the first link at `place`.
+        """
         turn = place.rotation()
         centers = self.centers @ turn.T + np.array(place.position)
         halves = self.halves @ np.abs(turn).T
@@ -168,7 +181,8 @@ def _boxes(robot: Model) -> Iterator[Bounds]:
     """The box around each link, wherever its joints take it."""
     frame = robot.links[0].pose.inverse()
     first = robot.links[0].pose.position
-    # For each link that joints connect with the first one: its joint's place, and the distance there along the joints, m.
+    # For each link that joints connect with the first one: its joint's place, and the distance
+    # there along the joints, m.
     chains = {robot.links[0].name: (first, 0.0)}
     # A file may name its joints in any order.
     for _ in robot.joints:

@@ -1,4 +1,6 @@
-"""The simulator of one scenario: a plant that is built once and run many times, each time without other models."""
+"""The simulator of one scenario: a plant that is built once and run many times, each time without
+other models.
+"""
 
 from __future__ import annotations
 
@@ -40,14 +42,18 @@ YIELD = (
 
 
 class Template:
-    """One plant of a scenario's world. Building it takes seconds; switching models off for a run takes milliseconds.
+    """One plant of a scenario's world. Building it takes seconds; switching models off for a run
+    takes milliseconds.
 
-    All runs share one context. Equal `keep` and `seed` give the same result bit for bit, whatever ran before, and the same as a
-    world that never had the removed models. `names` are the models in the plant; without `slices` it stays unknown who took part.
+    All runs share one context. Equal `keep` and `seed` give the same result bit for bit, whatever
+    ran before, and the same as a world that never had the removed models. `names` are the models in
+    the plant; without `slices` it stays unknown who took part.
     """
 
     def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
-        """Raises UserError for a robot or a controller that cannot drive, and for a world that Drake cannot simulate."""
+        """Raises UserError for a robot or a controller that cannot drive, and for a world that
+        Drake cannot simulate.
+        """
         spawn = scenario.robot.spawn
         goal = scenario.goal
         self._whole = whole_of(world, scenario)
@@ -72,8 +78,9 @@ class Template:
         self._solids = solids(self._solid)
         self._hull = Hull.of(robot)
         self._reach = self._hull.reach + YIELD
-        # What decides in a run is known: no controller of the user's, and no model that collides with itself. (Where slices were
-        # used beside such models, 23 of 274 implied tests differed.)
+        # What decides in a run is known: no controller of the user's, and no model that collides
+        # with itself. (Where slices were used beside such models, 23 of 274 implied tests
+        # differed.)
         self.slices = scenario.controller.use in BUILT_IN and not any(
             model.self_collide for model in world.models
         )
@@ -83,7 +90,8 @@ class Template:
         self._build(names)
 
     def without(self, names: frozenset[str]) -> Template:
-        """A template of the same world without the moving models `names`: cheaper, and with the same bits.
+        """A template of the same world without the moving models `names`: cheaper, and with the
+        same bits.
 
         `names` are `removable`. The two share what they know about the world.
         """
@@ -121,7 +129,9 @@ class Template:
         }
 
     def _build(self, names: frozenset[str]) -> None:
-        """Builds the plant with the models `names`. Everything else stays that of the whole world."""
+        """Builds the plant with the models `names`. Everything else stays that of the whole
+        world.
+        """
         self.names = names
         near = [model for model in self._solid.models if model.name in names - self._far]
         near = [self._grounds.get(model.name, model) for model in near]
@@ -135,7 +145,8 @@ class Template:
             raise UserError(f"{world.path}: cannot be simulated: {error}") from error
         if not built.robot.base.is_floating_base_body():
             raise UserError(
-                f"robot '{self._robot.name}': its first link must be free to move, not joined to the world or another link"
+                f"robot '{self._robot.name}': its first link must be free to move, not joined to "
+                "the world or another link"
             )
         at = spawn_pose(scenario.robot.spawn) @ self._robot.pose.inverse()
         watched = self._region if self._far or self._grounds else None
@@ -214,16 +225,19 @@ class Template:
 
 Result = TypeVar("Result")
 HELD = 5e-6  # what a moving model that is switched off costs in each step of a run, s
-# The minimum time to build a plant, and the time for each pair of shapes, s. A pair also takes 0.15 kB.
+# The minimum time to build a plant, and the time for each pair of shapes, s. A pair also takes 0.15
+# kB.
 BUILD = 0.05
 PAIR = 1e-6
-# A plant with more shapes than this gets no smaller ones beside it: each would take more than 150 MB.
+# A plant with more shapes than this gets no smaller ones beside it: each would take more than 150
+# MB.
 LARGEST = 1000
 MOST = 4  # the maximum number of smaller plants at a time
 
 
 class Variants:
-    """Runs a scenario as `Template` does, with the same results to the last bit, but in smaller plants where that saves time.
+    """Runs a scenario as `Template` does, with the same results to the last bit, but in smaller
+    plants where that saves time.
 
     It holds the template of the whole world and the last few smaller ones.
     """
@@ -258,7 +272,8 @@ class Variants:
         return self._within(lambda whole: whole.rehearsals.settled(whole.names))
 
     def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
-        """Each of `elements` that starts away from the robot with each one that it is tied to, as `Repertoire.ties`; sorted.
+        """Each of `elements` that starts away from the robot with each one that it is tied to, as
+        `Repertoire.ties`; sorted.
 
         None: unknown.
         """
@@ -275,7 +290,9 @@ class Variants:
         self._within(lambda whole: whole.rehearsals.learn(whole.names))
 
     def _within(self, work: Callable[[Template], Result]) -> Result:
-        """Does `work`, again from its beginning in a larger plant each time that something leaves the plant's region."""
+        """Does `work`, again from its beginning in a larger plant each time that something leaves
+        the plant's region.
+        """
         times = 1
         while True:
             try:
@@ -298,7 +315,8 @@ class Variants:
         if shapes <= LARGEST and BUILD + PAIR * shapes**2 < HELD * len(needless) * self._steps:
             if len(self._smaller) == MOST:
                 del self._smaller[0]
-                # Drake's diagrams refer to themselves: without a collection they would stay in memory, some 20 MB each.
+                # Drake's diagrams refer to themselves: without a collection they would stay in
+                # memory, some 20 MB each.
                 gc.collect()
             template = template.without(needless)
         if template is not self._whole:

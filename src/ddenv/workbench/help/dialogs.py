@@ -1,4 +1,6 @@
-"""Dialogs of every screen: a text to read, lines to choose one from, and two things side by side."""
+"""Dialogs of every screen: a text to read, lines to choose one from, and two things side by
+side.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,9 @@ class Reading(ModalScreen[None]):
 
 
 class Pick(ModalScreen[int | None]):
-    """Returns the number of the line that was chosen, or None. The line `head` stands above, the cursor begins `at` a line."""
+    """Returns the number of the line that was chosen, or None. The line `head` stands above, the
+    cursor begins `at` a line.
+    """
 
     BINDINGS: ClassVar = keys("pick", ("close", "escape,q", "dismiss", "close", "choose nothing"))
 

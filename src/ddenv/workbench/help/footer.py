@@ -28,7 +28,8 @@ class Entry:
 class KeyFooter(Keys):
     """Shows bindings by their ids, those `first` that matter most if not all fit.
 
-    Where `instead` returns ids, these are shown in their place: a pane with the focus has keys of its own.
+    Where `instead` returns ids, these are shown in their place: a pane with the focus has keys of
+    its own.
     """
 
     ALLOW_SELECT = False
@@ -56,7 +57,8 @@ class KeyFooter(Keys):
             self._renew_soon()
 
     def _renew_soon(self) -> None:
-        # To list what all keys do takes a while: one key changes several words, and the focus sends several signals.
+        # To list what all keys do takes a while: one key changes several words, and the focus sends
+        # several signals.
         if not self._due:
             self._due = True
             self.call_later(self.renew)

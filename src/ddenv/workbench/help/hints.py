@@ -1,4 +1,6 @@
-"""Keys with their words, which a click presses: below the frames of dialogs and panes, and in the footer."""
+"""Keys with their words, which a click presses: below the frames of dialogs and panes, and in the
+footer.
+"""
 
 from __future__ import annotations
 
@@ -63,13 +65,17 @@ class Framed(Vertical, Keys):
         self.border_subtitle = clickable(self._hints, own)
 
     def say(self, words: str) -> None:
-        """Says what a key did, in place of the keys for a moment: a notice would wait until the dialog is closed."""
+        """Says what a key did, in place of the keys for a moment: a notice would wait until the
+        dialog is closed.
+        """
         self.border_subtitle = Content(words)
         self.set_timer(SAID, self.on_mount)
 
 
 def clickable(hints: str, own: Mapping[str, str] = {}) -> Content:
-    """Hints to click, each for the key that it begins with; `own` has the user's keys by the usual ones."""
+    """Hints to click, each for the key that it begins with; `own` has the user's keys by the usual
+    ones.
+    """
     parts = []
     for hint in hints.split(GAP):
         word, _, words = hint.partition(" ")

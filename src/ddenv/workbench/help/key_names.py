@@ -1,4 +1,6 @@
-"""The names of keys: as a screen shows them, as the settings file writes them, and as Textual knows them."""
+"""The names of keys: as a screen shows them, as the settings file writes them, and as Textual knows
+them.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,9 @@ def written(key: str) -> str:
 
 
 def textual_keys(keys: str, where: str) -> str:
-    """Keys from the settings file, separated by commas, by Textual's names. Raises UserError that begins with `where`."""
+    """Keys from the settings file, separated by commas, by Textual's names. Raises UserError that
+    begins with `where`.
+    """
     names = [keys] if keys == "," else [key.strip() for key in keys.split(",")]
     return ",".join(_textual_key(key, where) for key in names)
 
@@ -67,7 +71,8 @@ def _textual_key(key: str, where: str) -> str:
         name = ""
     if not name or not set(modifiers) <= set(_MODIFIERS):
         raise UserError(
-            f"{where}: there is no key '{key}'; write a character, or a name such as space, enter, f2, ctrl+s or shift+left"
+            f"{where}: there is no key '{key}'; write a character, or a name such as space, "
+            "enter, f2, ctrl+s or shift+left"
         )
     found = "+".join((*sorted(modifiers, key=_MODIFIERS.index), name))
     if found in _SAME:

@@ -1,4 +1,6 @@
-"""What the keys do on a screen now, with the user's own keys: for the footer, the help and the list of commands."""
+"""What the keys do on a screen now, with the user's own keys: for the footer, the help and the list
+of commands.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,9 @@ TEXTUAL_WORDS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shortcut:
-    """`keys` as people write them; `action` runs on `node`. It is shown dimmed while it is not `enabled`."""
+    """`keys` as people write them; `action` runs on `node`. It is shown dimmed while it is not
+    `enabled`.
+    """
 
     keys: str
     words: str
@@ -64,7 +68,8 @@ class Group:
 def groups(screen: Screen[Any]) -> list[Group]:
     """The focused pane's shortcuts first, then the screen's, then the app's.
 
-    An action whose `check_action` returns False is left out; one with None is shown, but not enabled.
+    An action whose `check_action` returns False is left out; one with None is shown, but not
+    enabled.
     """
     panes: list[ActiveBinding] = []
     own: list[ActiveBinding] = []

@@ -1,4 +1,6 @@
-"""What every sign and letter on the run's screens means, in one list: one key away from each of them."""
+"""What every sign and letter on the run's screens means, in one list: one key away from each of
+them.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""What the screens of lessons share: their parts, the world of a run on their maps, and any moment of a search in it."""
+"""What the screens of lessons share: their parts, the world of a run on their maps, and any moment
+of a search in it.
+"""
 
 from __future__ import annotations
 

@@ -16,7 +16,8 @@ from ddenv.learn.lesson_course import LETTERS, Page
 from ddenv.learn.variables import Variable
 from ddenv.text import plain, truncated
 
-# The widths of what stands before an entry of a list, an answer, and a remark on it: longer lines go on below the words.
+# The widths of what stands before an entry of a list, an answer, and a remark on it: longer lines
+# go on below the words.
 BULLET = 2
 ANSWER = 6
 REMARK = 4
@@ -26,7 +27,9 @@ WIDTH = 15
 
 
 class LessonPane(VerticalScroll):
-    """Scrolls where a text is longer than its panel. A click on an answer gives it; the arrows put a cursor on one."""
+    """Scrolls where a text is longer than its panel. A click on an answer gives it; the arrows put
+    a cursor on one.
+    """
 
     _page: Page | None = None
     # The answer under the cursor; None before an arrow was pressed.
@@ -51,7 +54,9 @@ class LessonPane(VerticalScroll):
         self.query_one("#lesson-text", Static).update(page_text(page, room, self.cursor))
 
     def _choose(self, by: int) -> bool:
-        """Moves the cursor from answer to answer, once all is in sight; False if no question is open."""
+        """Moves the cursor from answer to answer, once all is in sight; False if no question is
+        open.
+        """
         page = self._page
         if (
             page is None
@@ -127,7 +132,9 @@ def _blocks(blocks: Sequence[Block], room: int) -> Text:
 
 
 def _hung(text: Text, indent: int, room: int) -> Text:
-    """A paragraph whose lines after the first are indented, if it takes more than `room` columns."""
+    """A paragraph whose lines after the first are indented, if it takes more than `room`
+    columns.
+    """
     if text.cell_len <= room or room < 4 * indent:
         return text
     # The first line has the sign in the place of the indent.

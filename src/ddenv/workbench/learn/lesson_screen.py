@@ -1,4 +1,6 @@
-"""A lesson on the screen: the map and Algorithm 1 of a recorded run, its variables, and the lesson's texts and questions."""
+"""A lesson on the screen: the map and Algorithm 1 of a recorded run, its variables, and the
+lesson's texts and questions.
+"""
 
 from __future__ import annotations
 
@@ -38,14 +40,18 @@ from ddenv.workbench.shared.observed import Observed
 
 
 class LessonScreen(LearnScreen[bool]):
-    """A lesson from where the student left it; or any run step by step. Leaving it keeps the student's place and answers.
+    """A lesson from where the student left it; or any run step by step. Leaving it keeps the
+    student's place and answers.
 
     It returns whether the student goes on to the next lesson.
     """
 
     AUTO_FOCUS = "LessonPane"
     NAME = "lesson"
-    FIRST = "help close on skip again activity run_back run_on predict hint variables next_reduction next_decision back"
+    FIRST = (
+        "help close on skip again activity run_back run_on predict hint variables next_reduction "
+        "next_decision back"
+    )
     BINDINGS: ClassVar = keys(
         "lesson",
         ("on", "enter,space", "on", "go on", "continue the lesson", "enter"),
@@ -113,7 +119,8 @@ class LessonScreen(LearnScreen[bool]):
     )
 
     def __init__(self, run: Path, opened: Opened | None = None, following: str = "") -> None:
-        """The lesson `opened`, whose run is `run`; without one the run alone. Raises UserError for a damaged run.
+        """The lesson `opened`, whose run is `run`; without one the run alone. Raises UserError for
+        a damaged run.
 
         `following` is the title of the next lesson, or "".
         """
@@ -176,7 +183,8 @@ class LessonScreen(LearnScreen[bool]):
         footer = self.query_one(KeyFooter)
         due = course.due and not course.is_open
         asked = page.question if page.chosen is None else None
-        # The pane *Algorithm* comes with the first step that speaks of it; where none does, it is shown from the start.
+        # The pane *Algorithm* comes with the first step that speaks of it; where none does, it is
+        # shown from the start.
         steps = () if self._opened is None else self._opened.lesson.steps
         plain = course.step < next(
             (at for at, step in enumerate(steps) if "*Algorithm*" in step.text), 0

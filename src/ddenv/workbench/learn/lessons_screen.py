@@ -90,7 +90,10 @@ class LessonsScreen(LearnScreen[None]):
         width = max(30, self.size.width - 40)
         options.clear_options()
         for number, lesson in enumerate(self._lessons, 1):
-            row = f"{number}  {truncated(plain(lesson.title), width):<{width}} {in_words(scores.get(lesson.name))}"
+            row = (
+                f"{number}  {truncated(plain(lesson.title), width):<{width}} "
+                f"{in_words(scores.get(lesson.name))}"
+            )
             options.add_option(Text(row, no_wrap=True))
         if self._lessons:
             options.highlighted = min(at, len(self._lessons) - 1)

@@ -1,4 +1,6 @@
-"""Searches of one world side by side, test by test; at the end, who needed the fewest tests, and why."""
+"""Searches of one world side by side, test by test; at the end, who needed the fewest tests, and
+why.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,8 @@ OUT = "□"
 GONE = "·"
 # Time between two tests while the race runs, s.
 PACE = 0.7
-# Rows: a racer without a map, the fewest with one, the panel below besides its line for each racer, header and footer.
+# Rows: a racer without a map, the fewest with one, the panel below besides its line for each racer,
+# header and footer.
 BARE = 5
 WITH_MAP = 11
 SAID = 6
@@ -68,7 +71,10 @@ class RacerPane(Vertical):
         done = race.is_done(play)
         stopped = done and not play.ended
         ended = done and play.ended
-        figures = f" · {count(tests, 'test')}{', stopped' if stopped else ''} · {len(left)} left{' ✓' if ended else ''}"
+        figures = (
+            f" · {count(tests, 'test')}{', stopped' if stopped else ''} · {len(left)} "
+            f"left{' ✓' if ended else ''}"
+        )
         # As text: a name may look like markup.
         self.border_title = Text(
             shortened(plain(play.name), max(6, room - 4 - len(figures))) + figures
@@ -80,17 +86,19 @@ class RacerPane(Vertical):
         if turn is not None:
             candidate = turn.candidate
             again = ", again" if turn.again else ""
-            what = f"{candidate.label}{again}: {count(candidate.size, 'model')} {SIGNS.get(turn.outcome, '?')}"
-        last = signs if len(signs) <= room else f"…{signs[-(room - 1) :]}"
-        self._said.update(
-            Text(
-                f"{truncated(what, room)}\n{_bar(play.begins, frozenset(left), there, room)}\n{last}"
+            what = (
+                f"{candidate.label}{again}: {count(candidate.size, 'model')} "
+                f"{SIGNS.get(turn.outcome, '?')}"
             )
-        )
+        last = signs if len(signs) <= room else f"…{signs[-(room - 1) :]}"
+        bar = _bar(play.begins, frozenset(left), there, room)
+        self._said.update(Text(f"{truncated(what, room)}\n{bar}\n{last}"))
 
 
 def _bar(models: Names, left: frozenset[str], there: frozenset[str], room: int) -> str:
-    """A cell for each model in the world's order; of more models than there is room, by their shares."""
+    """A cell for each model in the world's order; of more models than there is room, by their
+    shares.
+    """
     if len(models) <= room:
         return "".join(
             GONE if name not in left else IN if name in there else OUT for name in models
@@ -176,7 +184,8 @@ class RaceScreen(LearnScreen[None]):
             "Who won, and why" if race.over else "Tests that showed f, and tests that did not"
         )
         panel.border_subtitle = LEGEND
-        # A line for each search: its tests so far, those that showed f, and those that did not, by kind.
+        # A line for each search: its tests so far, those that showed f, and those that did not, by
+        # kind.
         width = min(LONGEST_NAME, max(len(play.name) for play in race.plays))
         heads = {kind: f"  {head}" for kind, head in COLUMNS.items()}
         said = Text(f"{'':<{width}}{'tests':>7}{''.join(heads.values())}", "dim", no_wrap=True)
@@ -217,7 +226,9 @@ class RaceScreen(LearnScreen[None]):
 
 
 def race_of_runs(runs: Sequence[Path]) -> RaceScreen:
-    """The searches of two to four run files. Raises UserError, also if they are not of one world."""
+    """The searches of two to four run files. Raises UserError, also if they are not of one
+    world.
+    """
     plays = plays_of_runs(runs)
     bases = []
     for run in runs:

@@ -1,4 +1,6 @@
-"""A student's own search: models are marked on the map, tests are run by a key, and at the end comes an honest verdict."""
+"""A student's own search: models are marked on the map, tests are run by a key, and at the end
+comes an honest verdict.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ SAID = {
 
 
 class TryScreen(LearnScreen[None]):
-    """The search `attempt` in the world of `run`; `keep` is called after each move. `plays` are compared with it at the end."""
+    """The search `attempt` in the world of `run`; `keep` is called after each move. `plays` are
+    compared with it at the end.
+    """
 
     AUTO_FOCUS = "WorldMap"
     NAME = "try"
@@ -135,7 +139,10 @@ class TryScreen(LearnScreen[None]):
             return
         first = "You keep the whole world, and it shows f. Which models does f need?"
         if self._asked:
-            first = f"Sure that no single one of {many} can go? m again confirms it and ends the search, esc goes on."
+            first = (
+                f"Sure that no single one of {many} can go? m again confirms it and ends the "
+                "search, esc goes on."
+            )
         elif attempt.tried:
             last = attempt.tried[-1]
             what = SAID[last.outcome].format(out=_names(last.out), held=many)
@@ -150,7 +157,10 @@ class TryScreen(LearnScreen[None]):
             word.apply_meta({"@click": f"screen.mark_one({attempt.oracle.models.index(name)})"})
             models.append_text(word).append("  ")
         left = len(attempt.held) - len(marked)
-        then = "space or a click marks a model, ] goes to the next. When no single one can go, press m."
+        then = (
+            "space or a click marks a model, ] goes to the next. When no single one can go, "
+            "press m."
+        )
         if not attempt.tests_left:
             then = "No tests are left. m: the verdict on what you keep."
         elif marked:

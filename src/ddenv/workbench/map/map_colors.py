@@ -1,4 +1,6 @@
-"""The colours and fillings of the map: mixed from the theme's, of which a terminal shows as many as it has."""
+"""The colours and fillings of the map: mixed from the theme's, of which a terminal shows as many as
+it has.
+"""
 
 from __future__ import annotations
 
@@ -20,12 +22,14 @@ STRENGTH = {KEPT: 0.74, FLOOR: 0.24, LEFT_OUT: 0.25, FLOOR_OUT: 0.10, PINNED: 0.
 LIGHT_STRENGTH = STRENGTH | {KEPT: 0.88, LEFT_OUT: 0.30, PINNED: 0.80}
 NEUTRAL: RGB = (128, 140, 160)
 YELLOW: RGB = (255, 215, 80)
-# How much of the text's colour removed models, robots beside the foremost one, and the two paths have.
+# How much of the text's colour removed models, robots beside the foremost one, and the two paths
+# have.
 FAINT = 0.35
 DULL = 0.5
 ORIGINAL = 0.55
 PATH = 0.8
-# Background and text that a theme of the terminal's own colours may have: it does not say which these are.
+# Background and text that a theme of the terminal's own colours may have: it does not say which
+# these are.
 OWN: dict[bool, tuple[RGB, RGB]] = {
     True: ((15, 20, 27), (213, 219, 229)),
     False: ((246, 248, 251), (28, 35, 45)),
@@ -34,7 +38,9 @@ OWN: dict[bool, tuple[RGB, RGB]] = {
 
 @dataclass(frozen=True, slots=True)
 class Tone:
-    """How a model looks: the `glyph` of a full cell in `ink` on `fill`, and the `seam` between neighbours that look alike."""
+    """How a model looks: the `glyph` of a full cell in `ink` on `fill`, and the `seam` between
+    neighbours that look alike.
+    """
 
     glyph: str
     fill: int
@@ -44,7 +50,9 @@ class Tone:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Palette:
-    """Packed colours. `back` is the map's background, or PLAIN for the terminal's own; `ground` is what is mixed with instead."""
+    """Packed colours. `back` is the map's background, or PLAIN for the terminal's own; `ground` is
+    what is mixed with instead.
+    """
 
     back: int
     ground: RGB
@@ -86,7 +94,9 @@ def mixed(
     accent: RGB = YELLOW,
     marks: tuple[RGB, RGB, RGB] | None = None,
 ) -> Palette:
-    """For a background and a text colour; with `own` the background is the terminal's. `marks` are those of start, goal and f."""
+    """For a background and a text colour; with `own` the background is the terminal's. `marks` are
+    those of start, goal and f.
+    """
     start, goal, failure = marks or ((31, 111, 235), (26, 127, 55), (207, 34, 46))
     # The accent is moved towards the text's colour if it is too near to the background's.
     moved = (packed(blend(accent, fore, part)) for part in (0.0, 0.25, 0.5))

@@ -1,4 +1,6 @@
-"""Draws the map of a world and its run: models, paths and letters, then the robots and the crosshair."""
+"""Draws the map of a world and its run: models, paths and letters, then the robots and the
+crosshair.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,8 @@ if TYPE_CHECKING:
 
 # Dots of the original path, or of the second way, and of the gaps in it.
 DASH = 5
-# In a world that is so many times as wide as the ways of the tests that are shown, the map fits these alone.
+# In a world that is so many times as wide as the ways of the tests that are shown, the map fits
+# these alone.
 LARGE = 4
 # Names are cut to the first of these lengths, in cells, for which there is room.
 LENGTHS = (26, 18, 10)
@@ -55,7 +58,8 @@ _Line = tuple[np.ndarray, int, int]
 _Robot = tuple[Vector, int, str]
 
 
-# Lying models are the slow part of a frame: 16 of 19 ms with 3,000 models, and only zooming and panning change it.
+# Lying models are the slow part of a frame: 16 of 19 ms with 3,000 models, and only zooming and
+# panning change it.
 _outlines = lru_cache(maxsize=4)(pack)
 
 
@@ -68,10 +72,11 @@ def _lying(prints: tuple[Footprint, ...], view: View) -> tuple[Spans, np.ndarray
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Picture:
-    """A canvas for `view`, with the looks of the models and the owner of each pixel: kept models in `grid`, removed ones in `gone`.
+    """A canvas for `view`, with the looks of the models and the owner of each pixel: kept models in
+    `grid`, removed ones in `gone`.
 
-    `dotted` cells show removed models, `written` ones bear a letter or a mark. `cells` is where each model's sign begins, if it
-    has one.
+    `dotted` cells show removed models, `written` ones bear a letter or a mark. `cells` is where
+    each model's sign begins, if it has one.
     """
 
     view: View
@@ -88,7 +93,9 @@ class Picture:
         return cell[0] < int(rows) and cell[1] < int(columns)
 
     def owner(self, cell: Cell) -> int | None:
-        """The number of the model that is seen in a cell, a removed one if there are dots; None if there is none."""
+        """The number of the model that is seen in a cell, a removed one if there are dots; None if
+        there is none.
+        """
         row, column = cell
         grid = self.gone if self.dotted[cell] else self.grid
         owner = int(grid[2 * row : 2 * row + 2, column].max())
@@ -127,7 +134,9 @@ class MapDrawing:
     def frame(
         self, shown: Shown, view: View, palette: Palette, cursor: Cell | None
     ) -> tuple[Canvas, Picture]:
-        """A new frame, and its picture without robots and crosshair. Without a `cursor` it has no crosshair."""
+        """A new frame, and its picture without robots and crosshair. Without a `cursor` it has no
+        crosshair.
+        """
         shown = self._with_live(shown)
         still = self._still(shown, view, palette)
         canvas = still.canvas.copy()
@@ -249,7 +258,9 @@ def _still(shown: Shown, view: View, palette: Palette) -> Picture:
 
 
 def _names(drawn: Picture, prints: Sequence[Footprint], near: Point | None) -> None:
-    """Writes the names of kept models beside their signs: the nearest to the place `near` first, then the largest; none overlap."""
+    """Writes the names of kept models beside their signs: the nearest to the place `near` first,
+    then the largest; none overlap.
+    """
     canvas = drawn.canvas
     written = drawn.written
     view = drawn.view
@@ -269,7 +280,9 @@ def _names(drawn: Picture, prints: Sequence[Footprint], near: Point | None) -> N
 
 
 def _room(drawn: Picture, at: tuple[int, int], text: str, sign: int) -> tuple[int, int, str] | None:
-    """The row and column for a name beside a sign of so many cells, or on the model without one; None where there is no room."""
+    """The row and column for a name beside a sign of so many cells, or on the model without one;
+    None where there is no room.
+    """
     begins = (
         ((0, sign + 1), (0, -len(text) - 1), (-1, 0), (1, 0)) if sign else ((0, 0), (-1, 0), (1, 0))
     )

@@ -49,14 +49,17 @@ LIMITS = ("▭", "limits")
 LONGEST_NAME = 40
 LONGEST_DROPPED = 16
 SHORT_DROPPED = 10
-# The first signs of `LEGEND` are places, which no map goes without. Two cells apart, they need so many cells.
+# The first signs of `LEGEND` are places, which no map goes without. Two cells apart, they need so
+# many cells.
 PLACES = 3
 GAP = 2
 WITH_GAPS = 28
 
 
 def legend(shown: Shown, width: int, lines: int = 2) -> Text:
-    """The signs on the map with their meanings, as many as fit: first where the robot starts, has to go and ended."""
+    """The signs on the map with their meanings, as many as fit: first where the robot starts, has
+    to go and ended.
+    """
     state = shown.snapshot.state
     layers = shown.layers
     meanings = {
@@ -105,7 +108,9 @@ def _sensed(state: RunState) -> list[tuple[str, float]]:
 
 
 def describe(state: RunState, each: Footprint, columns: int = 0) -> Text:
-    """Name, part, size, distance to f and time first sensed, as much as fits in `columns` (0: all). Names are shortened."""
+    """Name, part, size, distance to f and time first sensed, as much as fits in `columns` (0: all).
+    Names are shortened.
+    """
     width = each.high[0] - each.low[0]
     depth = each.high[1] - each.low[1]
     shaped = bool(each.polygons) and math.isfinite(width + depth)
@@ -137,7 +142,9 @@ def _standing(state: RunState, name: str) -> str:
 
 
 class MapLines(Widget):
-    """One line on what is shown, and one of signs; two of signs where nothing is to be said, or with `only_signs`."""
+    """One line on what is shown, and one of signs; two of signs where nothing is to be said, or
+    with `only_signs`.
+    """
 
     def __init__(self, only_signs: bool = False, *, id: str) -> None:
         super().__init__(id=id)

@@ -1,4 +1,6 @@
-"""How each model is drawn on the map: its part of the environment, and whether it is kept, left out, removed or protected."""
+"""How each model is drawn on the map: its part of the environment, and whether it is kept, left
+out, removed or protected.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,9 @@ FLOOR_FACTOR = 8.0
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Looks:
-    """One entry per footprint: `kinds` (KEPT ... SELECTED), `tones` as indices into `looks`, and what stands on it in `signs`."""
+    """One entry per footprint: `kinds` (KEPT ... SELECTED), `tones` as indices into `looks`, and
+    what stands on it in `signs`.
+    """
 
     kinds: np.ndarray
     tones: np.ndarray
@@ -60,7 +64,8 @@ class Looks:
 class Kept:
     """Who is in the environment, and the number of each model's part.
 
-    `shown` are the models of the candidate looked at, `dropped` those of them that lose what they rest on.
+    `shown` are the models of the candidate looked at, `dropped` those of them that lose what they
+    rest on.
     """
 
     elements: frozenset[str] = frozenset()
@@ -74,7 +79,9 @@ class Kept:
 
 
 def kept(shown: Shown) -> Kept:
-    """What the map needs of a run's state, and how models stand out in the layers that are shown."""
+    """What the map needs of a run's state, and how models stand out in the layers that are
+    shown.
+    """
     state = shown.snapshot.state
     layers = shown.layers
     candidate = shown.candidate
@@ -129,7 +136,9 @@ def _known(prints: tuple[Footprint, ...]) -> tuple[Names, np.ndarray]:
 
 
 def _signs(names: Names, kinds: np.ndarray, parts: np.ndarray, who: Kept) -> Signs:
-    """A letter for each model of a part, with its number in the order of sensing if that is shown, and whether it drops."""
+    """A letter for each model of a part, with its number in the order of sensing if that is shown,
+    and whether it drops.
+    """
     several = int(parts.max(initial=-1)) + 2
     groups = kinds * several + parts + 1
     found, which = np.unique(groups, return_inverse=True)
@@ -152,7 +161,8 @@ def _signs(names: Names, kinds: np.ndarray, parts: np.ndarray, who: Kept) -> Sig
     return Signs(texts, groups, rank, np.isin(kinds, (PINNED, SELECTED)) | falling)
 
 
-# The world and what is left of it stay the same while the user looks at one candidate after the other.
+# The world and what is left of it stay the same while the user looks at one candidate after the
+# other.
 @lru_cache(maxsize=8)
 def _among(names: Names, those: frozenset[str]) -> np.ndarray:
     if not those:
@@ -161,7 +171,9 @@ def _among(names: Names, those: frozenset[str]) -> np.ndarray:
 
 
 def fill(canvas: Canvas, grid: np.ndarray, how: Looks) -> None:
-    """Draws the models of an owner grid (two pixels a cell) as half blocks, with seams between those that look alike."""
+    """Draws the models of an owner grid (two pixels a cell) as half blocks, with seams between
+    those that look alike.
+    """
     if not len(how.kinds) or not canvas.back.size:
         return
     # The last entry of each stands for EMPTY, which is -1.
@@ -199,7 +211,8 @@ def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> No
     upper = pixels[0::2]
     lower = pixels[1::2]
     full = solid[upper] & (upper == lower)
-    # The background of a full block is invisible: one style for all makes a row of few pieces of text.
+    # The background of a full block is invisible: one style for all makes a row of few pieces of
+    # text.
     block = full & (canvas.chars == ord("█"))
     canvas.back[block] = seams[upper[block]]
     for where, char in ((above[0::2], "▇"), (beside[0::2] | beside[1::2], "▉")):
@@ -208,7 +221,8 @@ def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> No
     canvas.chars[halved] = ord("─")
     canvas.fore[halved] = seams[upper[halved]]
     canvas.back[halved] = fills[upper[halved]]
-    # Between protected platforms, too: a gap between them may be narrower than a pixel, and what the failure is about.
+    # Between protected platforms, too: a gap between them may be narrower than a pixel, and what
+    # the failure is about.
     protected = canvas.chars == ord(SOLID[PROTECTED])
     for where, line in ((above[0::2], "▔"), (beside[0::2] | beside[1::2], "▕")):
         canvas.chars[where & protected] = ord(line)
@@ -217,7 +231,8 @@ def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> No
 def ghosts(
     canvas: Canvas, removed: np.ndarray, grid: np.ndarray, how: Looks, color: int
 ) -> np.ndarray:
-    """Dots at removed models: `removed` is their owner grid. Of the kept models they hide only floors.
+    """Dots at removed models: `removed` is their owner grid. Of the kept models they hide only
+    floors.
 
     Returns which cells have dots, shape (rows, columns).
     """

@@ -1,4 +1,6 @@
-"""What a map shows: a place, read in a thread since worlds can be large, and the current state of a run."""
+"""What a map shows: a place, read in a thread since worlds can be large, and the current state of a
+run.
+"""
 
 from __future__ import annotations
 
@@ -43,9 +45,11 @@ PATIENCE = 10.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """What the map shows besides the run, in m: where the robot starts (x, y, yaw), its goal and the models.
+    """What the map shows besides the run, in m: where the robot starts (x, y, yaw), its goal and
+    the models.
 
-    `elements` are the names of the models that may be removed, `movable` the models that can move, by name.
+    `elements` are the names of the models that may be removed, `movable` the models that can move,
+    by name.
     """
 
     prints: tuple[Footprint, ...] = ()
@@ -59,7 +63,8 @@ class Place:
 class Way:
     """The robot's way in a finished test, `points` (N, 2) m, which the legend calls `name`.
 
-    The robot is now at `robot`, x, y m and yaw rad, and came through the first `gone` points; without it only the way is shown.
+    The robot is now at `robot`, x, y m and yaw rad, and came through the first `gone` points;
+    without it only the way is shown.
     """
 
     name: str
@@ -70,11 +75,13 @@ class Way:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shown:
-    """All that a map shows: a world, the current state of its run, and the `candidate` whose models stand out.
+    """All that a map shows: a world, the current state of its run, and the `candidate` whose models
+    stand out.
 
-    `layers` are from LAYERS; `selection` are the names of the models that the user selected. With `ways`, one or two, these are
-    shown in place of the run's own paths; they part at `parting`, m. `apart` are the sign and the words of the
-    models that are not in both, for the legend. `limits` say how far a model may move.
+    `layers` are from LAYERS; `selection` are the names of the models that the user selected. With
+    `ways`, one or two, these are shown in place of the run's own paths; they part at `parting`, m.
+    `apart` are the sign and the words of the models that are not in both, for the legend. `limits`
+    say how far a model may move.
     """
 
     place: Place = field(default_factory=Place)
@@ -98,7 +105,9 @@ class Shown:
 
     @property
     def same_paths(self) -> bool:
-        """Whether the last similar run has the same path as f: before the first reduction it is f."""
+        """Whether the last similar run has the same path as f: before the first reduction it is
+        f.
+        """
         original = self.snapshot.original
         evidence = self.snapshot.evidence
         return original is None or original == evidence
@@ -118,7 +127,8 @@ class MovedPrints:
         self._poses: dict[str, Pose] = {}
 
     def at(self, poses: Mapping[str, Pose]) -> tuple[Footprint, ...]:
-        """All footprints with the first links of these models at `poses`, and the others where they start.
+        """All footprints with the first links of these models at `poses`, and the others where they
+        start.
 
         The same object if nothing has moved.
         """
@@ -179,7 +189,9 @@ def place_of_run(path: Path) -> Place:
 
 
 def read_world(screen: Screen[Any], run: Path, show: Callable[[Place, str], None]) -> None:
-    """Calls `show` with the place, and with what is wrong with it, once it is read in a thread. The first paint comes before."""
+    """Calls `show` with the place, and with what is wrong with it, once it is read in a thread. The
+    first paint comes before.
+    """
 
     def read() -> None:
         try:

@@ -1,4 +1,6 @@
-"""The map of a run: the world from above, with a crosshair to choose models and places by keys or mouse."""
+"""The map of a run: the world from above, with a crosshair to choose models and places by keys or
+mouse.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,9 @@ WHEEL = 1.25
 
 
 class WorldMap(Widget, can_focus=True):
-    """Top-down map. It takes a `Place`, then snapshots. While `picking`, enter and clicks choose places, not models."""
+    """Top-down map. It takes a `Place`, then snapshots. While `picking`, enter and clicks choose
+    places, not models.
+    """
 
     # Whether enter and clicks choose places.
     picking = var(False)
@@ -159,7 +163,9 @@ class WorldMap(Widget, can_focus=True):
         apart: tuple[str, str] | None,
         prints: tuple[Footprint, ...],
     ) -> None:
-        """Shows finished tests in place of the run's own paths (see `Shown`), and the models at `prints`."""
+        """Shows finished tests in place of the run's own paths (see `Shown`), and the models at
+        `prints`.
+        """
         known = [way.points for way in self.shown.ways]
         place = self.place if prints is self.place.prints else replace(self.place, prints=prints)
         self.shown = replace(self.shown, place=place, ways=ways, parting=parting, apart=apart)
@@ -218,7 +224,9 @@ class WorldMap(Widget, can_focus=True):
         self.draw()
 
     def mark(self, name: str | None) -> None:
-        """Shows the crosshair on a model also without the focus; with None the map is again as it was."""
+        """Shows the crosshair on a model also without the focus; with None the map is again as it
+        was.
+        """
         if name is not None:
             self._unmarked = self._unmarked or copy(self.viewport)
             self.go_to(name)
@@ -419,7 +427,9 @@ class Viewport:
         self.fitted = True
 
     def resize(self, columns: int, rows: int, fitting: Callable[[int, int], View]) -> None:
-        """Changes the size or the important places: `fitting` returns a view of these for a size."""
+        """Changes the size or the important places: `fitting` returns a view of these for a
+        size.
+        """
         view = self.view
         new = (
             fitting(columns, rows)
@@ -430,7 +440,8 @@ class Viewport:
         if new == view:
             return
         if view is None or self.cursor == (view.rows // 2, view.columns // 2):
-            # The crosshair is in the middle until the user moves it; then it keeps its place in the world.
+            # The crosshair is in the middle until the user moves it; then it keeps its place in the
+            # world.
             self.cursor = rows // 2, columns // 2
         else:
             clipped = min(self.cursor[0], rows - 1), min(self.cursor[1], columns - 1)

@@ -1,4 +1,6 @@
-"""What the robot meets in the tests that are played back, up to the instant that is shown and after it."""
+"""What the robot meets in the tests that are played back, up to the instant that is shown and after
+it.
+"""
 
 from __future__ import annotations
 

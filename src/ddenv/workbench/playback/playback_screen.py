@@ -1,4 +1,6 @@
-"""A finished test played back on the map: the time within it, its speed, frame by frame, alone or over another test."""
+"""A finished test played back on the map: the time within it, its speed, frame by frame, alone or
+over another test.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,8 @@ STEP = 1.0
 SMALLEST = (64, 18)
 # Time between two pictures, s: more would only send more to the terminal.
 PERIOD = 0.1
-# The maximum number of tests in the list of those to play beside one, and the widths of its columns.
+# The maximum number of tests in the list of those to play beside one, and the widths of its
+# columns.
 LISTED = 200
 NUMBER = 7
 WORDS = 32
@@ -69,7 +72,9 @@ class Playing:
         self.time = min(max(0.0, time), self.length)
 
     def frames(self, number: int) -> None:
-        """So many frames on, or back if negative: to the instants at which the run file has a row."""
+        """So many frames on, or back if negative: to the instants at which the run file has a
+        row.
+        """
         frame = round(self.time / FRAME, 6)
         whole = int(frame) if number > 0 else -int(-frame // 1)
         self.go((whole + number) * FRAME)
@@ -103,8 +108,8 @@ FIRST = ids(
 
 
 class Playback(Screen[None]):
-    """Plays test number `test` of a run, over test `beside` if that is given; `place` is the run's world, if it is read already.
-    Runs with a changed number have negative numbers, and `limits`.
+    """Plays test number `test` of a run, over test `beside` if that is given; `place` is the run's
+    world, if it is read already. Runs with a changed number have negative numbers, and `limits`.
     """
 
     CSS_PATH = "playback.tcss"
@@ -288,7 +293,10 @@ class Playback(Screen[None]):
         self.map.show_ways(tuple(ways), place, self._apart, prints)
         self.query_one(Timeline).show(at, self._tests, parting)
         self.query_one(Met).show(at)
-        words = f"{'▶' if playing.on else '‖'} {at:.1f} s of {playing.length:.1f} s · {playing.speed:g} × real time"
+        words = (
+            f"{'▶' if playing.on else '‖'} {at:.1f} s of {playing.length:.1f} s · "
+            f"{playing.speed:g} × real time"
+        )
         ends = [way.robot[:2] for way in ways if way.robot is not None]
         if len(ends) == 2:
             words += f" · {math.dist(*ends):.2f} m apart"
@@ -394,7 +402,9 @@ def way_of(one: Played, name: str) -> Way:
 
 
 def snapshot_with(state: RunState, there: Names, groups: tuple[Names, ...]) -> Snapshot:
-    """The run as if these models were its environment, and these `groups` the parts of its round, each with a letter."""
+    """The run as if these models were its environment, and these `groups` the parts of its round,
+    each with a letter.
+    """
     round = (
         Round(
             number=0,
@@ -410,5 +420,7 @@ def snapshot_with(state: RunState, there: Names, groups: tuple[Names, ...]) -> S
 
 
 def without(there: Names, gone: Collection[str]) -> Trial:
-    """What the map takes for a candidate: the others of these models stand back, in small letters."""
+    """What the map takes for a candidate: the others of these models stand back, in small
+    letters.
+    """
     return Trial(number=0, models=tuple(name for name in there if name not in gone), node=0)

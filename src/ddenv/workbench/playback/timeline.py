@@ -1,4 +1,6 @@
-"""The time within a test as a slider: a line for each test, with the instant, its end, first touches, and when two part."""
+"""The time within a test as a slider: a line for each test, with the instant, its end, first
+touches, and when two part.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ class Timeline(Widget):
     def __init__(
         self, go: Callable[[float], None], turn: Callable[[int], None], *, id: str
     ) -> None:
-        """`go` is called with the simulated time, s, that the user wants to see, `turn` with so many frames."""
+        """`go` is called with the simulated time, s, that the user wants to see, `turn` with so
+        many frames.
+        """
         super().__init__(id=id)
         self._go = go
         self._turn = turn

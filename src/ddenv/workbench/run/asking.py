@@ -1,4 +1,6 @@
-"""Sends the run screen's commands to the engine in the background, and starts an engine if one is needed."""
+"""Sends the run screen's commands to the engine in the background, and starts an engine if one is
+needed.
+"""
 
 from __future__ import annotations
 
@@ -78,7 +80,10 @@ class Asking:
         """Why this screen cannot guide the run, or ""."""
         snapshot = self._poll.snapshot
         if self._poll.watch:
-            return f"watching only: to guide it, use 'ddenv open {attach_name(self._poll.path)}' without --watch"
+            return (
+                f"watching only: to guide it, use 'ddenv open {attach_name(self._poll.path)}' "
+                "without --watch"
+            )
         if snapshot.gone:
             return "the run file is gone: it can no longer be guided; q leaves"
         return "this run file cannot be read" if snapshot.error else ""
@@ -108,7 +113,9 @@ class Asking:
             self.refuse(f"{self._mine[id]}: not done, {why}")
 
     def ask(self, command: Command | StartEngine | Isolate, *, sure: bool = False) -> None:
-        """Sends a command, after its question unless the user is `sure`, or shows why it is not possible."""
+        """Sends a command, after its question unless the user is `sure`, or shows why it is not
+        possible.
+        """
         now = self.situation
         # What waited is decided on, although the engine has not obeyed yet.
         sure = sure or now.pending in ("accept", "reject")
@@ -128,7 +135,9 @@ class Asking:
             ask(self._screen.app, asked, lambda: self.send(command))
 
     def _decide_first(self, command: Command, dropped: str) -> None:
-        """Asks what becomes of the reduction that waits, before the new search that `command` begins."""
+        """Asks what becomes of the reduction that waits, before the new search that `command`
+        begins.
+        """
         from ddenv.workbench.run.dialogs import ReductionWaits
 
         state = self._poll.snapshot.state
@@ -146,7 +155,8 @@ class Asking:
     def send(self, command: Command, then: Callable[[], None] | None = None) -> None:
         """Sends a command in the background; `then` is called once it is written.
 
-        If no engine is running, the next one obeys it; one starts if the command needs it, and what that starts is trusted.
+        If no engine is running, the next one obeys it; one starts if the command needs it, and what
+        that starts is trusted.
         """
         now = self.situation
         if self._poll.watch:
@@ -186,7 +196,9 @@ class Asking:
         loop.run_in_executor(self._sender, send, self._poll.file, command).add_done_callback(sent)
 
     def go_on(self) -> None:
-        """Starts an engine for the last command if none is running, or if the last one ended without reading it."""
+        """Starts an engine for the last command if none is running, or if the last one ended
+        without reading it.
+        """
         snapshot = self._poll.snapshot
         if (
             self._due > snapshot.state.last_command
@@ -197,7 +209,9 @@ class Asking:
             self._once_trusted(self._start)
 
     def _once_trusted(self, then: Callable[[], None]) -> None:
-        """Calls `then` if the user trusts what an engine starts for this run, or says that nothing was done."""
+        """Calls `then` if the user trusts what an engine starts for this run, or says that nothing
+        was done.
+        """
         from ddenv.runs.subject import read_scenario
         from ddenv.workbench.widgets.question import once_trusted
 

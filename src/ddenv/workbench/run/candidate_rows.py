@@ -1,4 +1,6 @@
-"""The rows of the table beside the map, in words: tries and candidates, or the baseline's runs, or those of a certificate."""
+"""The rows of the table beside the map, in words: tries and candidates, or the baseline's runs, or
+those of a certificate.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,9 @@ OF_CANDIDATES = ("distance", "evidence")
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """`width` in cells, with the space before it. The greatest `spare` is left out first; 0 always stays."""
+    """`width` in cells, with the space before it. The greatest `spare` is left out first; 0 always
+    stays.
+    """
 
     name: str
     width: int

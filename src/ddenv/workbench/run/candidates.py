@@ -1,4 +1,6 @@
-"""The table of this round's candidates, of the baseline's runs before the first round, or of the certificate after the last."""
+"""The table of this round's candidates, of the baseline's runs before the first round, or of the
+certificate after the last.
+"""
 
 from __future__ import annotations
 
@@ -26,12 +28,16 @@ FAR = 1_000_000_000
 
 
 class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
-    """Only rows in sight become text: a DataTable takes seconds to list 5,000 candidates, at each round.
+    """Only rows in sight become text: a DataTable takes seconds to list 5,000 candidates, at each
+    round.
 
     The cursor follows the run until it is moved by hand.
     """
 
-    HELP = "evidence: ● f again   ◇ another failure   ○ goal reached   ✗ broke   ◷ took too long   ↓ drops a model"
+    HELP = (
+        "evidence: ● f again   ◇ another failure   ○ goal reached   ✗ broke   ◷ took too long   "
+        "↓ drops a model"
+    )
     ALLOW_SELECT = False
     COMPONENT_CLASSES: ClassVar = {"candidates--header", "candidates--cursor"}
     BINDINGS: ClassVar = keys(
@@ -48,7 +54,9 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def __init__(
         self, chosen: Callable[[], object] = lambda: None, *, id: str | None = None
     ) -> None:
-        """`chosen` is called when the cursor was moved by hand, or given back to the run: a message would be a frame later."""
+        """`chosen` is called when the cursor was moved by hand, or given back to the run: a message
+        would be a frame later.
+        """
         super().__init__(id=id)
         self._chosen = chosen
         self.following = True
@@ -59,7 +67,9 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
 
     @property
     def item(self) -> Item | None:
-        """What the row under the cursor is about, also in the tables of the baseline and of a certificate."""
+        """What the row under the cursor is about, also in the tables of the baseline and of a
+        certificate.
+        """
         return self._listed.item(self.cursor_row)
 
     @property

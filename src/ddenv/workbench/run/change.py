@@ -1,4 +1,6 @@
-"""Changing how a run goes on: the pair, the algorithm, when a candidate is taken, re-runs and the budget."""
+"""Changing how a run goes on: the pair, the algorithm, when a candidate is taken, re-runs and the
+budget.
+"""
 
 from __future__ import annotations
 
@@ -83,7 +85,9 @@ class Change(ModalScreen[commands.Change | None]):
             self.query_one(f"#{kind}-meaning", Static).update(Text(words))
 
     def _command(self) -> commands.Change:
-        """The command for the settings in the dialog. Raises UserError, which begins with the name of the first wrong field."""
+        """The command for the settings in the dialog. Raises UserError, which begins with the name
+        of the first wrong field.
+        """
         kinds = {kind: str(self.query_one(f"#{kind}", Select).value) for kind in KINDS}
         asked: dict[str, Value] = {
             "pair": f"{kinds['partitioning']}/{kinds['prioritization']}",

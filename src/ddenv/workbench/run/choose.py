@@ -18,13 +18,16 @@ from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.bindings import keys
 
-# Maximum number of names listed at once, and the maximum width of each in cells; typing finds others.
+# Maximum number of names listed at once, and the maximum width of each in cells; typing finds
+# others.
 LISTED = 100
 WIDTH = 36
 
 
 class ChooseModels(ModalScreen[Names | None]):
-    """Returns the chosen names, None if it was cancelled. Beside the list the map marks the model under the cursor."""
+    """Returns the chosen names, None if it was cancelled. Beside the list the map marks the model
+    under the cursor.
+    """
 
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = keys(
@@ -45,7 +48,8 @@ class ChooseModels(ModalScreen[Names | None]):
         pinned: Iterable[str] = (),
         chosen: Iterable[str] = (),
     ) -> None:
-        """`title` says what they are for; `pinned` ones are marked with +; `chosen` ones come first.
+        """`title` says what they are for; `pinned` ones are marked with +; `chosen` ones come
+        first.
 
         `mark` shows a model on the map, and none in the end.
         """
@@ -78,7 +82,9 @@ class ChooseModels(ModalScreen[Names | None]):
 
     @on(Input.Changed)
     def _typed(self) -> None:
-        """A space ticks the model under the cursor. It comes through the field, so that no key overtakes another."""
+        """A space ticks the model under the cursor. It comes through the field, so that no key
+        overtakes another.
+        """
         field = self.query_one(Input)
         if self._several and " " in field.value:
             field.value = field.value.replace(" ", "")
@@ -87,7 +93,9 @@ class ChooseModels(ModalScreen[Names | None]):
             self._filter()
 
     def _filter(self) -> None:
-        """Lists the names with the typed part. Each key calls it first: fast typing is ahead of the message `Changed`."""
+        """Lists the names with the typed part. Each key calls it first: fast typing is ahead of the
+        message `Changed`.
+        """
         part = self.query_one(Input).value.strip().lstrip("/").casefold()
         if part == self._part:
             return

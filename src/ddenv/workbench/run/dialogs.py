@@ -57,7 +57,9 @@ class Quit(Choice):
 
 
 class ReductionWaits(Choice):
-    """Asks what becomes of a reduction that waits: returns "accept", "reject", "drop" or "cancel"."""
+    """Asks what becomes of a reduction that waits: returns "accept", "reject", "drop" or
+    "cancel".
+    """
 
     BINDINGS: ClassVar = keys(
         "waits",
@@ -151,7 +153,9 @@ def failures(found: Sequence[OtherFailure]) -> Pick:
 
 
 def rounds(chapters: Sequence[Chapter], at: int | None) -> Pick:
-    """The list of rounds. The cursor starts on the chapter with the event `at`, or on the last one."""
+    """The list of rounds. The cursor starts on the chapter with the event `at`, or on the last
+    one.
+    """
 
     def line(name: str, models: str, left: str, tests: str) -> Text:
         return Text(f"{name:<16}{models:>8}{left:>10}{tests:>14}", no_wrap=True)

@@ -1,4 +1,6 @@
-"""The raw facts of one test, and the dialog with them: its log, contacts, end and seed, and the command that makes it again."""
+"""The raw facts of one test, and the dialog with them: its log, contacts, end and seed, and the
+command that makes it again.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,8 @@ WIDTH = 11
 
 
 def facts(position: Position, number: int, command: str) -> tuple[str, Text] | None:
-    """A title and the facts of the test with this number, as the run file has them now; None if there is no such test.
+    """A title and the facts of the test with this number, as the run file has them now; None if
+    there is no such test.
 
     `command` makes it again. Raises UserError if the file cannot be read.
     """
@@ -46,7 +49,10 @@ def facts(position: Position, number: int, command: str) -> tuple[str, Text] | N
         away = metres(test.distance, 2)
         place = f"({x:.2f}, {y:.2f}, {z:.2f}) m{f', {away} from the end of f' if away else ''}"
     if test.implied_by is not None:
-        took = f"not simulated: no model that it lacks can have affected test {test.implied_by}, which implies it"
+        took = (
+            f"not simulated: no model that it lacks can have affected test {test.implied_by}, "
+            "which implies it"
+        )
     elif test.is_finished:
         computed = (
             "its result was copied from another run"
@@ -117,7 +123,9 @@ class FactsDialog(ModalScreen[None]):
     )
 
     def __init__(self, position: Position, test: int, run: str, play: Callable[[int], str]) -> None:
-        """`run` is what a shell calls the run. `play` plays a test back, or returns why it cannot."""
+        """`run` is what a shell calls the run. `play` plays a test back, or returns why it
+        cannot.
+        """
         super().__init__()
         self._position = position
         self._test = test

@@ -1,4 +1,6 @@
-"""The panel that shows what is happening: the current line of the algorithm, and sentences on it."""
+"""The panel that shows what is happening: the current line of the algorithm, and sentences on
+it.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ PERIOD = 1.0
 
 
 class Happening(Widget):
-    """Lines of the algorithm around the current one, as many as there is room for, above the sentences."""
+    """Lines of the algorithm around the current one, as many as there is room for, above the
+    sentences.
+    """
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
@@ -36,7 +40,8 @@ class Happening(Widget):
         decided = state.paused, state.waiting_candidate, state.confirming, state.node, round
         urgent = trouble, snapshot.happened, snapshot.status, snapshot.error, *decided
         if urgent == self._urgent and moment - self._shown_at < PERIOD:
-            # Tests follow each other faster than anybody reads: the next update shows the one that runs then.
+            # Tests follow each other faster than anybody reads: the next update shows the one that
+            # runs then.
             return
         # With this most of `words` is loaded: the screen is shown before.
         from ddenv.words.explain import explain

@@ -1,4 +1,6 @@
-"""The models that are left: how many after each test, as a chart; the part of each, its distance to f, when it was sensed."""
+"""The models that are left: how many after each test, as a chart; the part of each, its distance to
+f, when it was sensed.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,8 @@ class ModelsLeft(Vertical):
         self.border_title = "Models left"
         self._find = find
         self._made_of: tuple[object, ...] = ()
-        # The part of each model, its footprint, and when it was sensed, simulated s; where f ended, m.
+        # The part of each model, its footprint, and when it was sensed, simulated s; where f ended,
+        # m.
         self._parts: dict[str, str] = {}
         self._prints: dict[str, Footprint] = {}
         self._sensed: dict[str, float] = {}
@@ -80,7 +83,9 @@ class ModelsLeft(Vertical):
         lines.show(sorted(state.environment, key=self._nearly))
 
     def _nearly(self, name: str) -> float:
-        """How far from f the rectangle around a model is, m: exact distances only for models in sight, of thousands."""
+        """How far from f the rectangle around a model is, m: exact distances only for models in
+        sight, of thousands.
+        """
         stands = self._prints.get(name)
         if stands is None or self._f is None:
             return math.inf
@@ -102,7 +107,9 @@ class ModelsLeft(Vertical):
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """What the chart shows: the size of the environment over `tests`, and after how many tests the user `decided` something."""
+    """What the chart shows: the size of the environment over `tests`, and after how many tests the
+    user `decided` something.
+    """
 
     points: Sequence[Point] = ()
     tests: int = 0
@@ -138,7 +145,8 @@ def steps(
 ) -> Text:
     """The chart as text of `height` lines; the last one is the axis of tests.
 
-    The styles are those of the tops of the steps, of what is below, and of the line of needed models.
+    The styles are those of the tops of the steps, of what is below, and of the line of needed
+    models.
     """
     points = course.points
     if not points or width < 12 or height < 3:
@@ -149,7 +157,8 @@ def steps(
     columns = width - margin - 1
     ruled = height >= 6 or (height >= 4 and bool(course.decided))
     rows = height - 1 - ruled
-    # For each column, how many models were left, and in which row the line of needed ones is: below the chart without any.
+    # For each column, how many models were left, and in which row the line of needed ones is: below
+    # the chart without any.
     left = []
     levels = []
     for column in range(columns):

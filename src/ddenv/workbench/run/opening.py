@@ -1,4 +1,6 @@
-"""What opens beside the run screen: dialogs, the history, the export, the 3-D scene; and the way out of the workbench."""
+"""What opens beside the run screen: dialogs, the history, the export, the 3-D scene; and the way
+out of the workbench.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,9 @@ LISTED = 200
 
 
 class Opening:
-    """Opens dialogs above the run screen, and acts on their answers. Those without arguments have keys, by their names."""
+    """Opens dialogs above the run screen, and acts on their answers. Those without arguments have
+    keys, by their names.
+    """
 
     def __init__(self, screen: RunScreen) -> None:
         self._screen = screen
@@ -120,7 +124,9 @@ class Opening:
         self.play_row(self._screen.table.item)
 
     def play_row(self, item: Item | None) -> None:
-        """Plays back the finished test that tells most of a row; of a certificate's row without a model, the one with it, too."""
+        """Plays back the finished test that tells most of a row; of a certificate's row without a
+        model, the one with it, too.
+        """
         test, beside = of_row(self._screen.browsing.position.now, item, finished=True)
         if test is None:
             self._asking.refuse("no test is finished yet: only a finished test can be played back")
@@ -271,11 +277,12 @@ class Opening:
 def of_row(
     state: RunState, item: Item | None, *, finished: bool = False
 ) -> tuple[int | None, int | None]:
-    """The test that tells most of a row, by its number, and one to compare it with: both None without tests.
+    """The test that tells most of a row, by its number, and one to compare it with: both None
+    without tests.
 
-    The last test of the row that showed f, else its last one, else the last one of all. Of the runs without a model: the first one
-    whose partner with the same seed, in what is left, showed f where it did not, and before it that partner. With `finished`, only
-    finished tests count.
+    The last test of the row that showed f, else its last one, else the last one of all. Of the runs
+    without a model: the first one whose partner with the same seed, in what is left, showed f where
+    it did not, and before it that partner. With `finished`, only finished tests count.
     """
     if isinstance(item, FreshRuns):
         own = _fresh(state, item.node, item.without)

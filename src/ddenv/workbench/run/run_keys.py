@@ -12,19 +12,26 @@ from ddenv.workbench.shared.bindings import HELP, MAP_KEYS, ids, keys
 # The footer's keys by priority; the last ones fit on wide screens only.
 FIRST = ids(
     "run",
-    "help quit pause accept reject leave_out step veto pin without undo history export why change only isolate"
+    "help quit pause accept reject leave_out step veto pin without undo history export why "
+    "change only isolate"
     " signs facts play rounds find layers copy scene runs",
 )
 # What comes next when the run has ended.
 ENDED = ids(
     "run",
-    "why isolate export play quit help inside leave_out history change pin without only undo find scene runs",
+    (
+        "why isolate export play quit help inside leave_out history change pin without only undo "
+        "find scene runs"
+    ),
 )
 # While an earlier moment is shown, while the map has the focus, and on a screen that only watches.
 BROWSING = ids("run", "back on round_before next_round rounds facts follow help quit play signs")
 ON_MAP = ids(
     "run",
-    "help quit pause accept reject leave_out map.pick map.next step pin without only undo history export why find layers fit",
+    (
+        "help quit pause accept reject leave_out map.pick map.next step pin without only undo "
+        "history export why find layers fit"
+    ),
 )
 LOOKING = ids("run", "help quit history rounds facts play why export find copy layers signs")
 # These ask for models if none are selected. A pin always asks: it ends the search.
@@ -49,7 +56,11 @@ _GUIDES = (
         "a",
         "accept",
         "accept",
-        "accept the reduction that waits, or adopt a try that shows f, or count another failure as f",
+        (
+            "accept the reduction that waits, or adopt a try that shows f, or count another "
+            "failure "
+            "as f"
+        ),
     ),
     ("x", "reject", "reject", "reject the reduction that waits, and go on with the round"),
     ("v", "veto", "veto", "leave out the candidate under the cursor; again takes that back"),
@@ -57,7 +68,10 @@ _GUIDES = (
         "p",
         "pin",
         "pins",
-        "choose the models that always stay; the selected ones are marked, pinned ones are unpinned",
+        (
+            "choose the models that always stay; the selected ones are marked, pinned ones are "
+            "unpinned"
+        ),
     ),
     (
         "w",

@@ -59,7 +59,8 @@ SMALLEST = (64, 18)
 WATCHING = "watching only: no key changes anything"
 # The panes and their words, in the order of the keys 1 to 5.
 PANES = {"map": "map", "round": "round", "chart": "chart", "now": "what is happening", "log": "log"}
-# How often the run file is read, s. While it catches up with a long run: the time to the next look, and between two updates.
+# How often the run file is read, s. While it catches up with a long run: the time to the next look,
+# and between two updates.
 PERIOD = 0.1
 AT_ONCE = 0.002
 CATCHING_UP = 0.5
@@ -89,7 +90,8 @@ class RunScreen(Screen[None]):
     def __init__(
         self, run: Path, engine: Engine | None = None, watch: bool = False, classes: str = ""
     ) -> None:
-        """`engine` is the one that was just started on this run. With `watch` nothing is ever sent. `classes` fit the size.
+        """`engine` is the one that was just started on this run. With `watch` nothing is ever sent.
+        `classes` fit the size.
 
         Raises UserError for a file that is no run file.
         """
@@ -108,7 +110,8 @@ class RunScreen(Screen[None]):
         self._footer = KeyFooter(LOOKING if watch else FIRST, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self._pane = "map"
-        # Whether something is not shown yet, whether the next look comes soon, and when the run was shown last.
+        # Whether something is not shown yet, whether the next look comes soon, and when the run was
+        # shown last.
         self._stale = False
         self._coming = False
         self._shown_at = time.monotonic()
@@ -194,7 +197,9 @@ class RunScreen(Screen[None]):
     # From the run file to the screen.
 
     def look(self) -> None:
-        """Shows what is new; while it catches up with a long run, whose events are old, only now and then."""
+        """Shows what is new; while it catches up with a long run, whose events are old, only now
+        and then.
+        """
         poll = self.poll
         before = self.poll.snapshot
         live = not self.poll.catching_up
@@ -221,7 +226,9 @@ class RunScreen(Screen[None]):
         self.look()
 
     def _focus(self) -> Candidate | None:
-        """The candidate to show. However fast the current one changes, it stays for `CALM` seconds, so that it can be read."""
+        """The candidate to show. However fast the current one changes, it stays for `CALM` seconds,
+        so that it can be read.
+        """
         snapshot = self.snapshot
         moment = time.monotonic()
         state = snapshot.state
@@ -261,7 +268,8 @@ class RunScreen(Screen[None]):
         self._show_models()
         panel = self.query_one("#round")
         for each in (panel, self.query_one("#now")):
-            # Its rows are wider than those of candidates. As a class of the screen it would compute all styles again.
+            # Its rows are wider than those of candidates. As a class of the screen it would compute
+            # all styles again.
             each.set_class(snapshot.state.certificate is not None, "-certificate")
         panel.border_title, panel.border_subtitle = round_title(snapshot.state)
         log = self.query_one("#log", Lines)
@@ -304,7 +312,9 @@ class RunScreen(Screen[None]):
 
     @property
     def pointed(self) -> Pointed:
-        """The row under the cursor, if it is in sight, and the selected models in the order of the world."""
+        """The row under the cursor, if it is in sight, and the selected models in the order of the
+        world.
+        """
         names = self.world.selection
         if not names and self.world.has_focus and (name := self.world.model_at_cursor) is not None:
             names = frozenset((name,))
@@ -330,7 +340,9 @@ class RunScreen(Screen[None]):
         return None if self._offer(str(parameters[0])).why_not else True
 
     def action_guide(self, name: str) -> None:
-        """Does what a key means now; it asks for models if none are selected but some are needed, and always for pins."""
+        """Does what a key means now; it asks for models if none are selected but some are needed,
+        and always for pins.
+        """
         offered = self._offer(name)
         if self.browsing.is_past:
             self.asking.refuse(offered.why_not)

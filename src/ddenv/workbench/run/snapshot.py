@@ -20,7 +20,9 @@ PATHS = 16
 
 
 class Browsing:
-    """Where in the run the screen is: at its end, where it follows the run, or at an earlier moment."""
+    """Where in the run the screen is: at its end, where it follows the run, or at an earlier
+    moment.
+    """
 
     def __init__(self, poll: Poll) -> None:
         self._poll = poll
@@ -33,7 +35,9 @@ class Browsing:
         return self.position.at is not None
 
     def step(self, what: Step, by: int) -> str:
-        """Goes on or back. Returns why that is not possible, or "". Raises UserError for a damaged file."""
+        """Goes on or back. Returns why that is not possible, or "". Raises UserError for a damaged
+        file.
+        """
         if self.position.step(what, by):
             return ""
         return f"there is no {what} before this moment" if by < 0 else "this is now already"
@@ -74,7 +78,9 @@ class Moments:
         )
 
     def path(self, test: int | None) -> array[float] | None:
-        """The robot's path in a test, as rows of `COLUMNS`; None if it is not recorded: the map is good for much without it."""
+        """The robot's path in a test, as rows of `COLUMNS`; None if it is not recorded: the map is
+        good for much without it.
+        """
         try:
             return None if test is None else self._motion(test)
         except UserError:

@@ -1,4 +1,6 @@
-"""The lines above and below the panels: what is reduced and how far it is; the engine, the tests and the time."""
+"""The lines above and below the panels: what is reduced and how far it is; the engine, the tests
+and the time.
+"""
 
 from __future__ import annotations
 
@@ -90,7 +92,8 @@ class Status(Widget):
         asked: str = "",
         place: tuple[int, int] | None = None,
     ) -> None:
-        """`scene` is the URL of the 3-D scene while it is on, `asked` the command that waits for its answer.
+        """`scene` is the URL of the 3-D scene while it is on, `asked` the command that waits for
+        its answer.
 
         At an earlier moment of the run, `place` is its number, and the number of moments.
         """
@@ -157,7 +160,8 @@ def heading(state: RunState) -> tuple[Sentences, Sentences]:
 
 
 def branch_of(state: RunState) -> int | None:
-    """Which branch of the tree of reductions the current node is on, from 1, in the order in which the branches began.
+    """Which branch of the tree of reductions the current node is on, from 1, in the order in which
+    the branches began.
 
     None on the newest one: that is where a run usually is.
     """
@@ -243,7 +247,9 @@ def tests_said(state: RunState) -> Sentences:
 
 
 def drift_said(state: RunState) -> Sentences:
-    """How often f shows here, beside the whole world; marked where it has dropped, with the key that goes back."""
+    """How often f shows here, beside the whole world; marked where it has dropped, with the key
+    that goes back.
+    """
     forms = drift(state)
     if has_dropped(state):
         return tuple(f"▼ {form}: u goes back" for form in forms)

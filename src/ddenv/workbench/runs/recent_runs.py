@@ -20,7 +20,9 @@ LOCKED = "database is locked"
 
 @dataclass(slots=True)
 class _Read:
-    """A file's run when the file had this `stamp`; while an engine works on it, also its `state`, to read on from there."""
+    """A file's run when the file had this `stamp`; while an engine works on it, also its `state`,
+    to read on from there.
+    """
 
     stamp: tuple[int, ...]
     recent: Recent
@@ -28,14 +30,17 @@ class _Read:
 
 
 class RunsFolder:
-    """A folder of runs, read repeatedly: each time only changed files, and only their new events."""
+    """A folder of runs, read repeatedly: each time only changed files, and only their new
+    events.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._read: dict[Path, _Read] = {}
 
     def look(self, patience: float = float("inf"), most: int | None = None) -> list[Recent]:
-        """The last changed runs, at most `most`. After `patience` s the rest waits for the next call, with `status` "".
+        """The last changed runs, at most `most`. After `patience` s the rest waits for the next
+        call, with `status` "".
 
         Not for the screen's thread.
         """
@@ -69,7 +74,9 @@ class RunsFolder:
 
 
 def _stamp(path: Path) -> tuple[int, ...]:
-    """When a run file and its log were changed, in ns, and how large they are: it is read again if one of these differs."""
+    """When a run file and its log were changed, in ns, and how large they are: it is read again if
+    one of these differs.
+    """
     file = path.stat()
     log = path.with_name(f"{path.name}-wal")
     with suppress(OSError):

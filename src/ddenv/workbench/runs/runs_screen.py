@@ -38,7 +38,8 @@ FOLDER = ".deleted"
 BESIDE = (*LOGS, ".log", ".scene.log", ".place")
 # How long a deleted run is kept, s.
 KEPT = 7 * 86_400.0
-# The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
+# The time between two reads of the folder, and the maximum time of a read before it shows its first
+# results, s.
 PERIOD = 1.0
 PATIENCE = 0.3
 # The footer's keys by priority.
@@ -46,7 +47,8 @@ FIRST = ids("runs", "help back open sort filter delete undo mark compare path wa
 
 
 def delete_run(path: Path) -> None:
-    """Moves a run and the files beside it to the deleted ones; those that were deleted a week ago are gone for good.
+    """Moves a run and the files beside it to the deleted ones; those that were deleted a week ago
+    are gone for good.
 
     Raises UserError while an engine works on it, or if it cannot be moved.
     """
@@ -66,7 +68,9 @@ def delete_run(path: Path) -> None:
 
 
 def bring_back(folder: Path) -> Path:
-    """Brings back the run of `folder` that was deleted last. Raises UserError if there is none, or if its name is taken."""
+    """Brings back the run of `folder` that was deleted last. Raises UserError if there is none, or
+    if its name is taken.
+    """
     for place in sorted(_places(folder), reverse=True):
         run = next(place.glob(f"*{SUFFIX}"), None)
         if run is None:
@@ -183,9 +187,15 @@ class RunsScreen(Screen[None]):
         table.display = bool(shown)
         empty = self.query_one("#empty", Static)
         empty.display = not shown
-        nothing = f"No runs yet in {runs_folder()}.\n\nescape goes back to make one, or type: ddenv run ditch"
+        nothing = (
+            f"No runs yet in {runs_folder()}.\n\nescape goes back to make one, or type: ddenv "
+            "run ditch"
+        )
         if self._runs:
-            nothing = f"No run has '{plain(part)}' in its name, scenario, method or state; escape shows all."
+            nothing = (
+                f"No run has '{plain(part)}' in its name, scenario, method or state; escape "
+                "shows all."
+            )
         empty.update(Text(nothing))
         works = sum(run.is_worked_on for run in self._runs)
         panel = self.query_one("#list")

@@ -1,4 +1,6 @@
-"""The list of recent runs, the table of all runs with as many columns as fit, and what is said of one run."""
+"""The list of recent runs, the table of all runs with as many columns as fit, and what is said of
+one run.
+"""
 
 from __future__ import annotations
 
@@ -77,7 +79,8 @@ def about(run: Recent) -> Text:
     )
 
 
-# All columns but the name, which takes the rest: title, width, whether it is a number, and its text.
+# All columns but the name, which takes the rest: title, width, whether it is a number, and its
+# text.
 _Column = tuple[str, int, bool, Callable[[Recent], str]]
 FIRST: tuple[_Column, ...] = (
     ("state", 16, False, lambda run: f"{run.sign} {run.state_words}"),
@@ -90,7 +93,8 @@ MORE: tuple[_Column, ...] = (
     ("changed", 11, True, lambda run: moment(run.changed)),
     ("scenario", 16, False, lambda run: plain(run.scenario)),
 )
-# By what the runs are sorted, in the order in which a key goes through it. Numbers and times begin with the most.
+# By what the runs are sorted, in the order in which a key goes through it. Numbers and times begin
+# with the most.
 ORDERS: dict[str, Callable[[Recent], Any]] = {
     "changed": lambda run: -run.changed,
     "name": lambda run: run.path.stem.casefold(),
@@ -141,7 +145,9 @@ class RunTable(DataTable[Text]):
 
     @property
     def _followed(self) -> Recent | None:
-        """The run on which the cursor stays. While runs are first read, their order changes: a cursor at the top stays there."""
+        """The run on which the cursor stays. While runs are first read, their order changes: a
+        cursor at the top stays there.
+        """
         is_reading = any(not run.status and not run.trouble for run in self._runs)
         return None if is_reading and self.cursor_row == 0 else self.chosen
 

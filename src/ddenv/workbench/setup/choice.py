@@ -1,4 +1,6 @@
-"""The choice on the setup screen: a scenario, a world or a run, read in a thread since worlds can be large."""
+"""The choice on the setup screen: a scenario, a world or a run, read in a thread since worlds can
+be large.
+"""
 
 from __future__ import annotations
 
@@ -25,10 +27,11 @@ GAP = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """A world, and the `settings` that the form starts with: the scenario's own, or the defaults for a `bare` world.
+    """A world, and the `settings` that the form starts with: the scenario's own, or the defaults
+    for a `bare` world.
 
-    With `run`, all comes from the run file `path`. `options` are those of the command line that read the world so, `missing` are
-    files that it names but that cannot be found.
+    With `run`, all comes from the run file `path`. `options` are those of the command line that
+    read the world so, `missing` are files that it names but that cannot be found.
     """
 
     path: Path
@@ -53,7 +56,9 @@ class Choice:
 
     @cached_property
     def height_above(self) -> float:
-        """How far the robot's frame is above the ground, m: as in the scenario, or else as the robot's shapes need."""
+        """How far the robot's frame is above the ground, m: as in the scenario, or else as the
+        robot's shapes need.
+        """
         from ddenv.world.extent import model_bounds
 
         spawn = self.settings.robot.spawn
@@ -73,7 +78,9 @@ class Choice:
         return None if top is None else round(top + self.height_above, 3)
 
     def _ground(self, x: float, y: float) -> float | None:
-        """The highest top of the boxes around the shapes at (x, y), m. None where there is nothing."""
+        """The highest top of the boxes around the shapes at (x, y), m. None where there is
+        nothing.
+        """
         import numpy as np
 
         from ddenv.world.extent import shape_bounds
@@ -119,12 +126,17 @@ class Choice:
         # The list has the name of a bundled file.
         where = "" if self.path.parent == SCENARIOS else f" {plain(str(self.path))}"
         if self.bare:
-            return f"{words} A world without a scenario: set the robot's spawn and goal, on the map or as numbers.{where}"
+            return (
+                f"{words} A world without a scenario: set the robot's spawn and goal, on the map "
+                f"or as numbers.{where}"
+            )
         return f"{words} {plain(self.settings.description)}{where}"
 
 
 def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
-    """A scenario, a world or a run file; `options` are the command line's on how to read worlds. Raises UserError."""
+    """A scenario, a world or a run file; `options` are the command line's on how to read worlds.
+    Raises UserError.
+    """
     from ddenv.runs.subject import read_parts, reading_of, scenario_for_world
     from ddenv.world.load import load_scenario
 

@@ -38,7 +38,9 @@ def not_used(one: Setting, algorithm: str) -> str:
 
 
 class OptionsForm(Vertical):
-    """The fields of `ddenv.workbench.setup.form`, whose ids are their names, the method, the cost, the command, and Start."""
+    """The fields of `ddenv.workbench.setup.form`, whose ids are their names, the method, the cost,
+    the command, and Start.
+    """
 
     @dataclass
     class Edited(Message):
@@ -56,7 +58,8 @@ class OptionsForm(Vertical):
         # What is wrong with fields, by id, and what else is wrong.
         self._problems: dict[str, str] = {}
         self._message = ""
-        # The texts of the rarely used fields, while they are not opened: with these the screen would open 0.15 s later.
+        # The texts of the rarely used fields, while they are not opened: with these the screen
+        # would open 0.15 s later.
         self._unopened = {one.name: next(iter(form.choices(one)), "") for one in form.ADVANCED}
         self.border_title = "Settings"
 
@@ -129,7 +132,9 @@ class OptionsForm(Vertical):
         return name if self._name_given and name != self._suggested else ""
 
     def show_settings(self, scenario: Scenario, places: Mapping[str, str]) -> None:
-        """Fills in the scenario's settings, in place of all earlier texts, with the texts of `places` in place of its own."""
+        """Fills in the scenario's settings, in place of all earlier texts, with the texts of
+        `places` in place of its own.
+        """
         texts = form.texts_of(scenario) | dict(places)
         if form.problem(JOBS, self.texts["jobs"]):
             texts["jobs"] = str(processor.usable_cores())
@@ -166,7 +171,9 @@ class OptionsForm(Vertical):
         self._explain(event.widget)
 
     def _explain(self, widget: Widget | None) -> None:
-        """In a few lines that scroll, the field that has the focus, or else the algorithm, which most depends on."""
+        """In a few lines that scroll, the field that has the focus, or else the algorithm, which
+        most depends on.
+        """
         # An open list of names is a widget inside its field.
         near = (
             []
@@ -213,7 +220,9 @@ class OptionsForm(Vertical):
         command.tooltip = plain(words) or None
 
     def complain(self, error: UserError) -> None:
-        """Shows an error below the fields, until it is corrected; wrong fields are marked, and the first one gets the cursor."""
+        """Shows an error below the fields, until it is corrected; wrong fields are marked, and the
+        first one gets the cursor.
+        """
         if not isinstance(error, form.FieldError):
             self.show_message(f"{MARK}{error}")
             return

@@ -1,4 +1,6 @@
-"""The files to choose from, bundled or opened before, and the dialogs that open others and save the settings as a scenario."""
+"""The files to choose from, bundled or opened before, and the dialogs that open others and save the
+settings as a scenario.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ def recent_files() -> list[Path]:
 
 
 def remember(path: Path) -> None:
-    """Puts a file first in the recent ones, if the list can be written; bundled scenarios are always listed."""
+    """Puts a file first in the recent ones, if the list can be written; bundled scenarios are
+    always listed.
+    """
     from ddenv.world.load import SCENARIOS
 
     if path.parent != SCENARIOS:
@@ -58,7 +62,9 @@ def _listed() -> list[Path]:
 
 
 class FileList(OptionList):
-    """Scenarios by their names, worlds by their files' names; a run gives its own scenario and world."""
+    """Scenarios by their names, worlds by their files' names; a run gives its own scenario and
+    world.
+    """
 
     @dataclass
     class Looked(Message):
@@ -191,7 +197,9 @@ def path_to_open(text: str) -> Path:
 
 
 def scenario_path(text: str) -> Path:
-    """The path of a file name, with .yaml if it has no ending. Raises UserError for an invalid name."""
+    """The path of a file name, with .yaml if it has no ending. Raises UserError for an invalid
+    name.
+    """
     text = text.strip()
     if not text.strip("./") or text.endswith("/") or "\0" in text:
         raise UserError("give the name of a file, such as my-world.yaml")
@@ -207,7 +215,8 @@ def scenario_path(text: str) -> Path:
 
 
 def save_scenario(scenario: Scenario, path: Path) -> None:
-    """Writes `scenario` as YAML, and replaces an existing file. Raises UserError, with nothing written.
+    """Writes `scenario` as YAML, and replaces an existing file. Raises UserError, with nothing
+    written.
 
     Files in the folder of `path` are named relative to it, so that the folder can be moved.
     """
@@ -217,13 +226,16 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
     for each in (scenario.world, scenario.robot.model):
         if not each.is_file():
             raise UserError(
-                f"{each}: no longer exists, so a scenario cannot refer to it; 'ddenv export' writes the world of a run"
+                f"{each}: no longer exists, so a scenario cannot refer to it; 'ddenv export' "
+                "writes the world of a run"
             )
     write_file(path, scenario_text(keys_in(path.resolve().parent, scenario), scenario))
 
 
 class SaveScenario(ModalScreen[Path | None]):
-    """Returns the file that was written, or None. An existing file is only replaced after a second enter."""
+    """Returns the file that was written, or None. An existing file is only replaced after a second
+    enter.
+    """
 
     BINDINGS: ClassVar = [
         Binding("escape", "dismiss(None)", "cancel", id="save.cancel", tooltip="write nothing")

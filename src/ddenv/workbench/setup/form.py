@@ -1,4 +1,6 @@
-"""The fields of the setup screen, each a setting: turns texts into values, with errors that name the field. Pure."""
+"""The fields of the setup screen, each a setting: turns texts into values, with errors that name
+the field. Pure.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +54,10 @@ PLACES = (*SPAWN, *GOAL)
 ADVANCED = tuple(one for one in OPTIONS if one.shown == "more")
 NAMED = "the name of the run: a file in the runs folder, or a path that ends in .ddenv"
 NAME = Setting(default=None, meaning=NAMED, name="run_name")
-ACCEPTED = "whether each reduction is accepted at once (automatic), or waits for you to accept or reject it (ask)"
+ACCEPTED = (
+    "whether each reduction is accepted at once (automatic), or waits for you to accept or "
+    "reject it (ask)"
+)
 ACCEPT = Setting(default=None, meaning=ACCEPTED, name="accept", choices=("automatic", "ask"))
 FIELDS = {one.name: one for one in (*BASIC, *PLACES, *ADVANCED, NAME, ACCEPT)}
 
@@ -66,7 +71,9 @@ class FieldError(UserError):
 
 
 def in_words(wrong: Mapping[str, str]) -> str:
-    """Why fields are wrong, in one line. Those that are wrong for the same reason are named together."""
+    """Why fields are wrong, in one line. Those that are wrong for the same reason are named
+    together.
+    """
     labels: dict[str, list[str]] = {}
     for name, why in wrong.items():
         labels.setdefault(why, []).append(FIELDS[name].label)
@@ -109,7 +116,9 @@ def problem(one: Setting, text: str) -> str:
 
 
 def values(fields: tuple[Setting, ...], texts: Mapping[str, str]) -> dict[str, Value]:
-    """The values of the texts, by the names of the fields. Raises FieldError, which names all that are wrong."""
+    """The values of the texts, by the names of the fields. Raises FieldError, which names all that
+    are wrong.
+    """
     if wrong := {one.name: why for one in fields if (why := problem(one, texts.get(one.name, "")))}:
         raise FieldError(wrong)
     return {one.name: value(one, texts.get(one.name, "")) for one in fields}
@@ -146,14 +155,17 @@ def texts_of(scenario: Scenario) -> dict[str, str]:
 
 
 def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str) -> Scenario:
-    """`base` with the values of the fields. Raises UserError, or FieldError if a text is not a number."""
+    """`base` with the values of the fields. Raises UserError, or FieldError if a text is not a
+    number.
+    """
     from ddenv.runs.subject import with_values
     from ddenv.world.load import validate
 
     data = base.model_dump(mode="json")
     before = texts_of(base)
     given = values(tuple(FIELDS[name] for name in before), texts)
-    # What is unchanged is not asked for: one field may set what others show, and a long number is shown rounded.
+    # What is unchanged is not asked for: one field may set what others show, and a long number is
+    # shown rounded.
     known = {
         name: one
         for name, one in SETTINGS.items()

@@ -1,7 +1,8 @@
-"""What of a world is not as its file says: what cannot be used, with the remedy of each, and parts that were replaced or ignored.
+"""What of a world is not as its file says: what cannot be used, with the remedy of each, and parts
+that were replaced or ignored.
 
-The remedy of a file is a stand-in, `none`, or a folder, and is remembered by URI; one of Fuel can be fetched. An element that is
-not supported can only be left out, `none`.
+The remedy of a file is a stand-in, `none`, or a folder, and is remembered by URI; one of Fuel can
+be fetched. An element that is not supported can only be left out, `none`.
 """
 
 from __future__ import annotations
@@ -49,10 +50,12 @@ It is used in every world that names this file."""
 
 @dataclass(frozen=True, slots=True)
 class Missing:
-    """A URI that cannot be used, or the name of an element that is not supported: its `kind` says which.
+    """A URI that cannot be used, or the name of an element that is not supported: its `kind` says
+    which.
 
-    Its `remedy` is a stand-in as for `--stand-in`, the absolute path of a folder, or "" for none yet. `words` say what stands on
-    the map for it, and first what is wrong with a file that was found, or if it is not in the folder that was chosen for it.
+    Its `remedy` is a stand-in as for `--stand-in`, the absolute path of a folder, or "" for none
+    yet. `words` say what stands on the map for it, and first what is wrong with a file that was
+    found, or if it is not in the folder that was chosen for it.
     """
 
     uri: str
@@ -71,9 +74,11 @@ def kinds(rows: Iterable[Missing]) -> str:
 def read_with_remedies(
     path: Path, reading: Reading, options: Mapping[str, Any]
 ) -> tuple[World, Data, tuple[Missing, ...]]:
-    """The world, with remembered remedies for what cannot be used, and a guess for all else; the `options` with these remedies.
+    """The world, with remembered remedies for what cannot be used, and a guess for all else; the
+    `options` with these remedies.
 
-    `reading` is the scenario's own, `options` are as on the command line. Raises Unsupported, and UserError.
+    `reading` is the scenario's own, `options` are as on the command line. Raises Unsupported, and
+    UserError.
     """
     from ddenv.runs.subject import reading_of
     from ddenv.world.files.resources import fuel_model
@@ -125,7 +130,8 @@ def read_with_remedies(
 
 
 class MissingList(OptionList):
-    """A row for each file or element that cannot be used, then for each kind of part that was replaced or ignored.
+    """A row for each file or element that cannot be used, then for each kind of part that was
+    replaced or ignored.
 
     It is hidden while there is none.
     """
@@ -155,7 +161,9 @@ class MissingList(OptionList):
         self.display = False
 
     def show(self, rows: tuple[Missing, ...], notes: tuple[Note, ...] = ()) -> None:
-        """Shows other rows; the cursor stays where it was, or goes to the first row without a remedy."""
+        """Shows other rows; the cursor stays where it was, or goes to the first row without a
+        remedy.
+        """
         same = [row.uri for row in rows] == [row.uri for row in self._rows]
         place = self.highlighted if same else None
         self._rows = rows

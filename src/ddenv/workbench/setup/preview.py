@@ -56,10 +56,12 @@ ASKS = {
 
 
 class Preview(Vertical):
-    """The panel with the world. `choice` is the last one read, None while reading (`awaited`) or after an error.
+    """The panel with the world. `choice` is the last one read, None while reading (`awaited`) or
+    after an error.
 
-    `picked_next` is "start", "heading" or "goal", what is picked on the map next, or "" for nothing. The settings and the places
-    are in the form, which it fills in. `past` is what earlier runs of the choice say of its cost.
+    `picked_next` is "start", "heading" or "goal", what is picked on the map next, or "" for
+    nothing. The settings and the places are in the form, which it fills in. `past` is what earlier
+    runs of the choice say of its cost.
     """
 
     BINDINGS: ClassVar = keys(
@@ -69,7 +71,9 @@ class Preview(Vertical):
 
     @dataclass
     class Read(Message):
-        """The choice was read; or it cannot be read, and the map says why. `opened`: the user opened its file just now."""
+        """The choice was read; or it cannot be read, and the map says why. `opened`: the user
+        opened its file just now.
+        """
 
         opened: bool = False
 
@@ -114,7 +118,9 @@ class Preview(Vertical):
         self.call_after_refresh(self._show_about)
 
     def read(self, path: Path, *, opened: bool) -> None:
-        """Reads a scenario, a world or a run in a thread. A file that the user `opened` is remembered."""
+        """Reads a scenario, a world or a run in a thread. A file that the user `opened` is
+        remembered.
+        """
         self._keeps_places = self.choice is not None and self.choice.bare
         self.awaited = True
         self.past = Past()
@@ -354,7 +360,9 @@ class Preview(Vertical):
     def _look_at_start(
         self, choice: Choice, spawn: tuple[float, ...] | None, goal: tuple[float, ...] | None
     ) -> None:
-        """Shows what is wrong with the start, as the run would note it, and where it had better be."""
+        """Shows what is wrong with the start, as the run would note it, and where it had better
+        be.
+        """
         from ddenv.world.placement import note_inside, notes_on_start, stands_inside
         from ddenv.world.scenario import Spawn
 

@@ -1,4 +1,6 @@
-"""The setup screen: choose a scenario or a world, see it, change its settings, start; or open an earlier run."""
+"""The setup screen: choose a scenario or a world, see it, change its settings, start; or open an
+earlier run.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +54,8 @@ FIRST = ids("setup", "help quit start baseline save copy open")
 
 
 class SetupScreen(Screen[None]):
-    """Small terminals show one of three panes at a time: the list of choices, the map, or the settings.
+    """Small terminals show one of three panes at a time: the list of choices, the map, or the
+    settings.
 
     Nothing is written before the user starts a run, and then only if all settings are valid.
     """
@@ -144,7 +147,8 @@ class SetupScreen(Screen[None]):
         yield Static("", id="small", markup=False)
 
     def on_mount(self) -> None:
-        # Reading scenarios, worlds and runs computes for longer than the first picture, which would wait for that.
+        # Reading scenarios, worlds and runs computes for longer than the first picture, which would
+        # wait for that.
         self.call_after_refresh(self._list_files)
         self.query_one(FileList).focus()
 
@@ -242,7 +246,9 @@ class SetupScreen(Screen[None]):
         self.form.show_outcome(cost, words, typed)
 
     def _asked(self) -> tuple[Choice, Scenario]:
-        """The choice, and its scenario with the form's settings. Raises UserError while there is none."""
+        """The choice, and its scenario with the form's settings. Raises UserError while there is
+        none.
+        """
         choice = self.preview.choice
         (pair, algorithm) = self.form.method
         if choice is None:

@@ -1,4 +1,6 @@
-"""A run from the setup screen's form: what it will cost, the command that does the same, its file and its engine."""
+"""A run from the setup screen's form: what it will cost, the command that does the same, its file
+and its engine.
+"""
 
 from __future__ import annotations
 
@@ -31,14 +33,18 @@ ENOUGH = 3
 
 @dataclass(frozen=True, slots=True)
 class Past:
-    """From earlier runs of a scenario: the median time of a test, real `seconds`, and the `rate` of f in their baselines."""
+    """From earlier runs of a scenario: the median time of a test, real `seconds`, and the `rate` of
+    f in their baselines.
+    """
 
     seconds: float | None = None
     rate: float | None = None
 
 
 def past_of(scenario: Scenario, folder: Path) -> Past:
-    """The cost in the newest runs in `folder` with the same name, timeout and files, in any folder."""
+    """The cost in the newest runs in `folder` with the same name, timeout and files, in any
+    folder.
+    """
     from ddenv.runfile.events import BaselineFinished, TestFinished
 
     try:
@@ -93,7 +99,10 @@ def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
     if past.seconds is None:
         return f"{words}: {parts}{rare}"
     spent = about(*(each * past.seconds / jobs for each in (middle, low, high)))
-    return f"{words}: {parts}{rare}; {spent} with {count(jobs, 'job')} at {past.seconds:.1f} s a test, as before"
+    return (
+        f"{words}: {parts}{rare}; {spent} with {count(jobs, 'job')} at {past.seconds:.1f} s a "
+        "test, as before"
+    )
 
 
 def command_words(choice: Choice, asked: Scenario, jobs: int, name: str = "") -> list[str]:
@@ -138,7 +147,9 @@ def command_words(choice: Choice, asked: Scenario, jobs: int, name: str = "") ->
 def create(
     choice: Choice, scenario: Scenario, path: Path, jobs: int, accept_mode: str, only_baseline: bool
 ) -> Engine:
-    """Writes the run file `path` and starts its engine, with `jobs` tests at a time. Raises UserError."""
+    """Writes the run file `path` and starts its engine, with `jobs` tests at a time. Raises
+    UserError.
+    """
     from ddenv.runfile.store import RunFile
     from ddenv.runs.creation import create_like, create_run
     from ddenv.workbench.shared.processes import Engine
@@ -151,7 +162,8 @@ def create(
         remember(choice.path)
     engine.start(jobs, accept_mode)
     if only_baseline:
-        # A step of one round ends after the baseline. The engine has started: it ignores older commands.
+        # A step of one round ends after the baseline. The engine has started: it ignores older
+        # commands.
         with RunFile(path) as run:
             run.send("step", unit="round")
     return engine

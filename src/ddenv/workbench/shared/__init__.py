@@ -1,1 +1,3 @@
-"""What several screens share: the run as it is read, its programs, words, and messages to the app."""
+"""What several screens share: the run as it is read, its programs, words, and messages to the
+app.
+"""

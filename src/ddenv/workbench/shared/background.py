@@ -11,7 +11,9 @@ from ddenv.text import plain
 
 
 def is_open(node: DOMNode) -> bool:
-    """Whether a widget still exists with all its children: a screen that is being closed loses them one by one."""
+    """Whether a widget still exists with all its children: a screen that is being closed loses them
+    one by one.
+    """
     return node.is_attached and node.screen.display
 
 
@@ -21,7 +23,9 @@ def refuse(node: Widget, why: str) -> None:
 
 
 def call_if_open(node: DOMNode, callback: Callable[..., object], *words: object) -> None:
-    """Calls `callback(*words)` in the app's thread, from another thread, unless `node` is closed."""
+    """Calls `callback(*words)` in the app's thread, from another thread, unless `node` is
+    closed.
+    """
 
     def call() -> None:
         if is_open(node):

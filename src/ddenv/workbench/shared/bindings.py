@@ -16,8 +16,8 @@ MAP_KEYS = (
 def keys(screen: str, *rows: tuple[str, ...], priority: bool = False) -> list[BindingType]:
     """The bindings of a screen or a pane, whose names in the file of keys begin with `screen`.
 
-    A row has the name, the keys, the action, its word in the footer, what the help says, and maybe how the footer writes the key.
-    With `priority` they come before those of what has the focus.
+    A row has the name, the keys, the action, its word in the footer, what the help says, and maybe
+    how the footer writes the key. With `priority` they come before those of what has the focus.
     """
     found: list[BindingType] = []
     for name, each, action, word, words, *display in rows:

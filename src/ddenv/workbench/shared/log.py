@@ -55,7 +55,9 @@ class Log:
 
     @staticmethod
     def parts(entry: Entry, width: int) -> list[Text]:
-        """An entry with its time of day, in lines that fit; what belongs to the line before stays indented."""
+        """An entry with its time of day, in lines that fit; what belongs to the line before stays
+        indented.
+        """
         return _in_lines(entry.time, entry.words, width, "  ")
 
 

@@ -1,4 +1,6 @@
-"""Messages from a screen to the app: show another screen in its place, or get the user's attention."""
+"""Messages from a screen to the app: show another screen in its place, or get the user's
+attention.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ if TYPE_CHECKING:
 
 @dataclass
 class ShowRun(Message):
-    """Attach to `run`; only `watch` it, without guiding it. `engine` has just been started on it."""
+    """Attach to `run`; only `watch` it, without guiding it. `engine` has just been started on
+    it.
+    """
 
     run: Path
     watch: bool = False
@@ -23,7 +27,9 @@ class ShowRun(Message):
 
 @dataclass
 class ShowSetup(Message):
-    """The setup screen, with the settings of the run `like` filled in, or with a scenario's or a world's `file` chosen."""
+    """The setup screen, with the settings of the run `like` filled in, or with a scenario's or a
+    world's `file` chosen.
+    """
 
     like: Path | None = None
     file: Path | None = None

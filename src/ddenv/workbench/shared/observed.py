@@ -1,4 +1,6 @@
-"""A run file as a screen reads it: nothing is written, not even beside it, and no look waits for a writer."""
+"""A run file as a screen reads it: nothing is written, not even beside it, and no look waits for a
+writer.
+"""
 
 from __future__ import annotations
 
@@ -41,11 +43,14 @@ class Observed(RunFile):
         self._check()
 
     def refresh(self) -> bool:
-        """Whether there may be something new since the last call. Raises Gone, Busy, or UserError if it cannot be read."""
+        """Whether there may be something new since the last call. Raises Gone, Busy, or UserError
+        if it cannot be read.
+        """
         place = _place(self.path)
         if place[:2] != self._origin[:2]:
             raise Gone(
-                f"{self.path}: the run file was {'replaced' if place[1] else 'deleted'} while it was open"
+                f"{self.path}: the run file was {'replaced' if place[1] else 'deleted'} while it "
+                "was open"
             )
         if place != self._place:
             # Without a log the file is open as immutable; now somebody writes it.
@@ -65,7 +70,9 @@ class Observed(RunFile):
             return file.send(kind, **data)
 
     def tidy(self) -> None:
-        """Closes it; the last one to do so folds the log back, so that the run is one file again."""
+        """Closes it; the last one to do so folds the log back, so that the run is one file
+        again.
+        """
         self.close()
         place = _place(self.path)
         if place[:2] == self._origin[:2] and place[2] and os.access(self.path.parent, os.W_OK):
@@ -77,7 +84,8 @@ class Observed(RunFile):
             raise UserError(
                 f"{self.path}: its last writer crashed; open it once without --watch to repair it"
             )
-        # All connections of a process share one index: while this one cannot write it, none can, and nothing could be sent.
+        # All connections of a process share one index: while this one cannot write it, none can,
+        # and nothing could be sent.
         index = "&readonly_shm=1" if shared and self._strictly else ""
         how = f"mode=ro{index}" if logged else "immutable=1"
         address = f"{self.path.resolve().as_uri()}?{how}"
@@ -101,7 +109,8 @@ class Observed(RunFile):
             raise UserError(f"{self.path}: damaged run file: {error}") from None
 
 
-# Device and inode, whether there is a log with something in it, whether that has an index, and the file's own age and size.
+# Device and inode, whether there is a log with something in it, whether that has an index, and the
+# file's own age and size.
 _Place = tuple[int, int, bool, bool, tuple[int, int]]
 
 

@@ -22,7 +22,8 @@ from ddenv.workbench.shared.observed import Busy, Gone, Observed
 LOCK_PERIOD = 0.5
 # How often the poses of running tests are read: more often would only send more to the terminal, s.
 LIVE_PERIOD = 0.25
-# Maximum time of a look, s, and number of events read at a time: keys are answered even while a long run is read.
+# Maximum time of a look, s, and number of events read at a time: keys are answered even while a
+# long run is read.
 PATIENCE = 0.015
 SOME_EVENTS = 50
 
@@ -35,8 +36,9 @@ def now() -> float:
 class Poll:
     """One open run file, which is only ever read.
 
-    `starting` says whether an engine was started that may not hold the lock yet. With `watch` nothing is written.
-    `on_event` is called once with each event's kind and the states before and after it.
+    `starting` says whether an engine was started that may not hold the lock yet. With `watch`
+    nothing is written. `on_event` is called once with each event's kind and the states before and
+    after it.
     """
 
     def __init__(
@@ -78,7 +80,9 @@ class Poll:
             self.file.tidy()
 
     def look(self) -> Snapshot | None:
-        """The new snapshot, or None if nothing changed since the last look, or another program is writing."""
+        """The new snapshot, or None if nothing changed since the last look, or another program is
+        writing.
+        """
         try:
             self._behind = self.file.refresh() or self._behind
             snapshot = self._read()
@@ -147,7 +151,9 @@ class Poll:
         return replace(snapshot, behind=more, version=__version__)
 
     def _follow(self) -> tuple[str, bool]:
-        """Reads new events up to the first invalid one; what is wrong with that, and whether there are more. Raises Busy."""
+        """Reads new events up to the first invalid one; what is wrong with that, and whether there
+        are more. Raises Busy.
+        """
         from ddenv.runfile.fold import steps
 
         begun = time.monotonic()
@@ -182,7 +188,9 @@ class Poll:
         return "starting" if self._starting() else "absent"
 
     def _poses(self, state: RunState) -> tuple[tuple[Live, ...], bool]:
-        """Where the robots are, and whether that was read just now. Valid rows name a test and have a whole, finite pose."""
+        """Where the robots are, and whether that was read just now. Valid rows name a test and have
+        a whole, finite pose.
+        """
         moment = time.monotonic()
         if self._snapshot is not None and moment - self._posed < LIVE_PERIOD:
             running = {test.id for test in state.running_tests}

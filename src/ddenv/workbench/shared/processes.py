@@ -63,7 +63,9 @@ class Engine:
 
 
 class Scene:
-    """The scene program of one run. `url` is known as soon as it serves; `trouble` says why it does not."""
+    """The scene program of one run. `url` is known as soon as it serves; `trouble` says why it does
+    not.
+    """
 
     def __init__(self, run: Path) -> None:
         self.run = run
@@ -104,7 +106,9 @@ class Scene:
             )
 
     def wait(self) -> None:
-        """Blocks until the program has printed its URL or has ended: not for the screen's thread."""
+        """Blocks until the program has printed its URL or has ended: not for the screen's
+        thread.
+        """
         process = self._process
         if process is None or process.stdout is None:
             return

@@ -1,4 +1,5 @@
-"""The workbench in a browser: textual-serve starts one for each page, only on this machine's own address.
+"""The workbench in a browser: textual-serve starts one for each page, only on this machine's own
+address.
 
 The address has a token, so that other users of this machine cannot act as this one.
 """
@@ -29,9 +30,11 @@ FONT_SIZE = 16
 
 
 def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None:
-    """Serves until interrupted; each page has its own workbench, attached to `run` if given, in letters of `font_size` pixels.
+    """Serves until interrupted; each page has its own workbench, attached to `run` if given, in
+    letters of `font_size` pixels.
 
-    Raises UserError if textual-serve is not installed, the port is taken, or the run does not exist.
+    Raises UserError if textual-serve is not installed, the port is taken, or the run does not
+    exist.
     """
     try:
         from textual_serve.server import Server
@@ -66,7 +69,8 @@ def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None
             user = getpass.getuser()
             lines = (
                 f"The workbench is at http://{HOST}:{port}/{token}/{size} (ctrl+c ends it).",
-                f"Anyone with that address acts as {user} on this machine: the workbench can read, write and start "
+                f"Anyone with that address acts as {user} on this machine: the workbench can "
+                "read, write and start "
                 "programs in your name.",
                 "Other machines cannot reach it. From yours, type there first:",
                 f"  ssh -L {port}:{HOST}:{port} {user}@{socket.gethostname()}",
@@ -80,7 +84,9 @@ def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None
 
 
 def guard(port: int, token: str) -> Any:
-    """Refuses requests without the token, and those of other web pages in a browser on this machine."""
+    """Refuses requests without the token, and those of other web pages in a browser on this
+    machine.
+    """
     from aiohttp import web
 
     own = {f"{host}:{port}" for host in (HOST, "localhost")}
@@ -92,7 +98,9 @@ def guard(port: int, token: str) -> Any:
         given = request.path.encode().split(b"/")[1]
         if not hmac.compare_digest(given, token.encode()):
             raise web.HTTPForbidden(
-                text="the address of this workbench has a token; copy all of it from 'ddenv serve'\n"
+                text=(
+                    "the address of this workbench has a token; copy all of it from 'ddenv serve'\n"
+                )
             )
         if request.host not in own or (
             origin is not None and origin.removeprefix("http://") not in own
@@ -108,7 +116,8 @@ def guard(port: int, token: str) -> Any:
                 if response.content_type == "text/html" and hasattr(response, "text")
                 else ""
             )
-            # What a page may load and run: the terminal of textual-serve, and the connection to the workbench.
+            # What a page may load and run: the terminal of textual-serve, and the connection to the
+            # workbench.
             rules = {
                 "script-src": f"'self' {of_scripts(text or '')}".strip(),
                 # The terminal writes the style of each cell.

@@ -1,4 +1,6 @@
-"""The colours: two themes of ddenv, Textual's, and the terminal's own colours if it has only sixteen."""
+"""The colours: two themes of ddenv, Textual's, and the terminal's own colours if it has only
+sixteen.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,8 @@ LIGHT = Theme(
         "text-disabled": "auto 55%",
     },
 )
-# The terminal's own sixteen colours: for terminals that have no more, and for users who prefer them.
+# The terminal's own sixteen colours: for terminals that have no more, and for users who prefer
+# them.
 ANSI = "ansi-dark"
 OURS = (DARK, LIGHT)
 
@@ -64,7 +67,8 @@ def theme_called(name: str, where: str) -> str:
     if name in theme_names():
         return name
     raise UserError(
-        f"{where}: there is no theme '{name}'{nearest(name, theme_names())}; 'ddenv config' lists them"
+        f"{where}: there is no theme '{name}'{nearest(name, theme_names())}; 'ddenv config' "
+        "lists them"
     )
 
 
@@ -74,7 +78,9 @@ def fitting(color_system: str | None) -> str:
 
 
 def for_rich(variables: Mapping[str, str]) -> dict[str, str]:
-    """A theme's variables, with Rich's names for the terminal's own colours: not ansi_red 50% but red."""
+    """A theme's variables, with Rich's names for the terminal's own colours: not ansi_red 50% but
+    red.
+    """
     ansi = {
         key: value.split()[0].removeprefix("ansi_")
         for key, value in variables.items()
@@ -88,7 +94,9 @@ def for_rich(variables: Mapping[str, str]) -> dict[str, str]:
 
 
 def ink(variables: Mapping[str, str], name: str, *, bold: bool = False) -> Style:
-    """The theme's colour `name` as the colour of text; without colour if the theme leaves it to the terminal."""
+    """The theme's colour `name` as the colour of text; without colour if the theme leaves it to the
+    terminal.
+    """
     try:
         value = variables[name]
         # In Textual `blue` is the web's colour, not the terminal's.

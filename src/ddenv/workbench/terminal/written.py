@@ -1,7 +1,8 @@
 """Remembers the cells on the terminal, and sends only cells that changed.
 
-A running reduction of the ditch at 120 x 36 sends 3 kB a second with it, and 66 kB without: Textual sends whole rows. This depends
-on two internal classes of Textual, which describe updates; tests/workbench/terminal/test_written.py checks them.
+A running reduction of the ditch at 120 x 36 sends 3 kB a second with it, and 66 kB without: Textual
+sends whole rows. This depends on two internal classes of Textual, which describe updates;
+tests/workbench/terminal/test_written.py checks them.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from rich.style import Style
 from textual._compositor import ChopsUpdate, CompositorUpdate, LayoutUpdate
 from textual.strip import Strip
 
-# Fewer unchanged cells than this between changed ones are written again: moving the cursor takes as many bytes.
+# Fewer unchanged cells than this between changed ones are written again: moving the cursor takes as
+# many bytes.
 GAP = 8
 # The errors of an update whose classes have changed.
 STRANGE = (AttributeError, IndexError, KeyError, TypeError, ValueError)
@@ -33,7 +35,9 @@ class Written:
         self._rows.clear()
 
     def fewer(self, update: RenderableType | None) -> RenderableType | None:
-        """The same update, but it writes only changed cells. An update of an unknown kind is returned unchanged."""
+        """The same update, but it writes only changed cells. An update of an unknown kind is
+        returned unchanged.
+        """
         if type(update) is ChopsUpdate or type(update) is LayoutUpdate:
             return _Fewer(self, update)
         if update is not None:
@@ -48,7 +52,8 @@ class Written:
             row = self._rows.setdefault(y, [])
             row += [None] * (x + width - len(row))
             cells: list[Cell] = [(char, style) for text, style, _ in strip for char in text]
-            # Terminals do not agree on which characters are wide: a piece with these is always written as a whole.
+            # Terminals do not agree on which characters are wide: a piece with these is always
+            # written as a whole.
             single = all(char.isascii() or cell_len(char) == 1 for char in set(strip.text))
             plain = len(cells) == width and strip.text.isprintable() and single
             before = row[x : x + width]

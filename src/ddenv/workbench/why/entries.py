@@ -1,4 +1,6 @@
-"""What the why view lists, and in which words: each model that is left, and at the end the nearest world that passes."""
+"""What the why view lists, and in which words: each model that is left, and at the end the nearest
+world that passes.
+"""
 
 from __future__ import annotations
 
@@ -33,10 +35,12 @@ FIGURES = 23
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """Something that is left out of the environment of `snapshot`: the models `gone`, which have the sign `letter` on the map.
+    """Something that is left out of the environment of `snapshot`: the models `gone`, which have
+    the sign `letter` on the map.
 
-    `sentence` says what happens then, `more` the rates; `parting` compares two runs with one seed, whose ways are called `ways`;
-    `claim` is that of a certificate. A number that is changed has `limits` to draw, and `figures` for its row.
+    `sentence` says what happens then, `more` the rates; `parting` compares two runs with one seed,
+    whose ways are called `ways`; `claim` is that of a certificate. A number that is changed has
+    `limits` to draw, and `figures` for its row.
     """
 
     name: str
@@ -53,7 +57,9 @@ class Entry:
 
 
 def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
-    """The entries, and how many models there are beyond those that are listed. Raises UserError for a damaged file."""
+    """The entries, and how many models there are beyond those that are listed. Raises UserError for
+    a damaged file.
+    """
     certificate = current(state)
     found = () if certificate is None else reasons(file, state)
     claims = {} if certificate is None else {each.without: each for each in certificate.claims}
@@ -144,7 +150,9 @@ def head(width: int) -> Text:
 
 
 def listed(entries: Sequence[Entry], width: int) -> Iterator[Text]:
-    """The letter of each model on the map, its name, how often f shows without it, and the interval of that in %."""
+    """The letter of each model on the map, its name, how often f shows without it, and the interval
+    of that in %.
+    """
     names = told_apart(tuple(one.name for one in entries if one.claim is not None), _name(width))
     for one in entries:
         claim = one.claim
@@ -170,7 +178,9 @@ def _name(width: int) -> int:
 
 
 def said(one: Entry, lacks: Sequence[str]) -> Text:
-    """What happens without the models, with the rates, where the ways part, and what the run file `lacks` of them."""
+    """What happens without the models, with the rates, where the ways part, and what the run file
+    `lacks` of them.
+    """
     text = Text(plain(one.sentence), "bold")
     for words in filter(None, one.more):
         text.append(f"\n\n{plain(words)}", "not bold")
@@ -180,7 +190,9 @@ def said(one: Entry, lacks: Sequence[str]) -> Text:
 
 
 def head_of(state: RunState, works: bool) -> str:
-    """How far the search for the nearest world that passes is, if one has begun, and how often f shows in what is left."""
+    """How far the search for the nearest world that passes is, if one has begun, and how often f
+    shows in what is left.
+    """
     certificate = current(state)
     title = (
         "Why it fails"
@@ -193,22 +205,38 @@ def head_of(state: RunState, works: bool) -> str:
 
 
 def nothing_yet(state: RunState, works: bool, run: str) -> str:
-    """Why there is nothing to show, and what to do; `works`: an engine does. `run` is what a shell calls the run."""
-    shows = "Full runs of what is left, with and without each of its models, show why: the certificate makes them."
+    """Why there is nothing to show, and what to do; `works`: an engine does. `run` is what a shell
+    calls the run.
+    """
+    shows = (
+        "Full runs of what is left, with and without each of its models, show why: the "
+        "certificate makes them."
+    )
     making = in_the_making(state)
     command = remedy(state, works, run)
     if (certificate := current(state)) is not None:
         return no_reasons(certificate)
     if command:
-        return f"{shows}\n\n{as_sentence(shown(state))} Make one, and come back: {command}   (c copies that)"
+        return (
+            f"{shows}\n\n{as_sentence(shown(state))} Make one, and come back: {command}   (c "
+            "copies that)"
+        )
     if making is not None:
         made = made_of_usual(state, making)
-        return f"{shows}\n\nIt is being made: {made}. This page fills in by itself.\n\n{as_sentence(shown(state))}"
-    return f"{shows}\n\nIt is made once the search ends, and this page then fills in by itself. The search is still running."
+        return (
+            f"{shows}\n\nIt is being made: {made}. This page fills in by "
+            f"itself.\n\n{as_sentence(shown(state))}"
+        )
+    return (
+        f"{shows}\n\nIt is made once the search ends, and this page then fills in by itself. The "
+        "search is still running."
+    )
 
 
 def remedy(state: RunState, works: bool, run: str) -> str:
-    """The command by which the run gets a certificate; "" if it needs none, or comes to one by itself."""
+    """The command by which the run gets a certificate; "" if it needs none, or comes to one by
+    itself.
+    """
     if current(state) is not None or works:
         return ""
     return f"ddenv {'certify' if state.status == 'finished' else 'resume'} {run}"

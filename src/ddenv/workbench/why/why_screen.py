@@ -1,4 +1,6 @@
-"""Why the robot fails: what happens without each model that is left, and the nearest world that passes, in words and on the map."""
+"""Why the robot fails: what happens without each model that is left, and the nearest world that
+passes, in words and on the map.
+"""
 
 from __future__ import annotations
 
@@ -59,8 +61,9 @@ STOP = "stop"
 
 
 class WhyScreen(Screen[None]):
-    """`look` says whether an engine works on the run, and the error that ended the last one, or "". `ask` starts and stops engines,
-    or says why not; `place` is the run's world, if it is read already.
+    """`look` says whether an engine works on the run, and the error that ended the last one, or "".
+    `ask` starts and stops engines, or says why not; `place` is the run's world, if it is read
+    already.
     """
 
     CSS_PATH = "why.tcss"
@@ -160,7 +163,9 @@ class WhyScreen(Screen[None]):
         self._show_entry()
 
     def _look(self) -> None:
-        """Reads all again once there is another certificate, or another nearest world that passes."""
+        """Reads all again once there is another certificate, or another nearest world that
+        passes.
+        """
         state = self._position.now
         (works, trouble) = self._engine()
         self.query_one("#why-header", Static).update(
@@ -280,7 +285,10 @@ class WhyScreen(Screen[None]):
         if one is None or one.parting is None:
             refuse(
                 self,
-                "there are no two runs to play: none that share a seed and end differently are stored",
+                (
+                    "there are no two runs to play: none that share a seed and end differently are "
+                    "stored"
+                ),
             )
             return
         try:

@@ -1,4 +1,6 @@
-"""An input that shows its text from the beginning: a number without its sign or its first digit would be another number."""
+"""An input that shows its text from the beginning: a number without its sign or its first digit
+would be another number.
+"""
 
 from __future__ import annotations
 

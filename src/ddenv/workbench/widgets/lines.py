@@ -14,7 +14,8 @@ from textual.strip import Strip
 
 
 class Lines(ScrollView, can_focus=True):
-    """One line for each item, made by `line(item, width)` when it becomes visible. With `tail` the last ones are shown.
+    """One line for each item, made by `line(item, width)` when it becomes visible. With `tail` the
+    last ones are shown.
 
     With `parts` an item takes several lines: `parts(item, width)` are what `line` is called with.
     """
@@ -29,7 +30,9 @@ class Lines(ScrollView, can_focus=True):
         clicked: Callable[[Any], object] = lambda _: None,
         id: str | None = None,
     ) -> None:
-        """`nothing` is shown when there are no items; `clicked` is called with what a line shows that was clicked."""
+        """`nothing` is shown when there are no items; `clicked` is called with what a line shows
+        that was clicked.
+        """
         super().__init__(id=id)
         self._line = line
         self._nothing = nothing

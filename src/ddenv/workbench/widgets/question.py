@@ -1,4 +1,6 @@
-"""Dialogs that ask a question: also whether a program may start that a scenario or a run brings along."""
+"""Dialogs that ask a question: also whether a program may start that a scenario or a run brings
+along.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ if TYPE_CHECKING:
 
 
 class Choice(ModalScreen[str]):
-    """Returns the answer that was chosen. `answers` are the words of the buttons by answers; the first one has the focus.
+    """Returns the answer that was chosen. `answers` are the words of the buttons by answers; the
+    first one has the focus.
 
     `text` may contain names from files, so it is never markup.
     """
@@ -83,7 +86,9 @@ def ask(app: App[Any], text: str, then: Callable[[], object]) -> None:
 def once_trusted(
     app: App[Any], scenario: Scenario, where: Path, then: Callable[[bool], None]
 ) -> None:
-    """Calls `then` with whether the user trusts what `scenario` (of the file `where`) starts; asks only where that is not known."""
+    """Calls `then` with whether the user trusts what `scenario` (of the file `where`) starts; asks
+    only where that is not known.
+    """
     from ddenv.runs.trust import trust, untrusted
 
     program = untrusted(scenario)

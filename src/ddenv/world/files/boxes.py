@@ -15,14 +15,17 @@ SQUARE = 1e-3  # the maximum cosine of the angle between two faces of a box
 
 
 def box_of(mesh: Mesh) -> tuple[Box, Pose] | None:
-    """The box that a convex mesh is, and its pose in the frame of the mesh; None if it is another shape."""
+    """The box that a convex mesh is, and its pose in the frame of the mesh; None if it is another
+    shape.
+    """
     if len(mesh.vertices) != 8:
         return None
     corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.sqrt((normals * normals).sum(axis=1))
     normals = normals[areas > 0] / areas[areas > 0, None]
-    # The axes of the box in the order of those of the mesh that they are nearest to, so that a box along these is not turned.
+    # The axes of the box in the order of those of the mesh that they are nearest to, so that a box
+    # along these is not turned.
     first = normals[normals[:, 0].argmax()]
     across = normals[np.abs(normals @ first) < SQUARE]
     if not len(across):

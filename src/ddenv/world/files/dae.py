@@ -1,8 +1,9 @@
 """Reads COLLADA (.dae) files in the frame in which Gazebo shows them.
 
-As in Gazebo's loader, `<unit>` scales the mesh and `<up_axis>` is ignored: worlds pose their models for Gazebo's view, and
-exporters wrote any up axis. Of several elements of one kind that share an id the first counts: exporters give one id to elements
-of different kinds. Only positions are read, so that errors in materials, lights, animations and skeletons do no harm.
+As in Gazebo's loader, `<unit>` scales the mesh and `<up_axis>` is ignored: worlds pose their models
+for Gazebo's view, and exporters wrote any up axis. Of several elements of one kind that share an id
+the first counts: exporters give one id to elements of different kinds. Only positions are read, so
+that errors in materials, lights, animations and skeletons do no harm.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ MOST_WEIGHT = 400_000_000
 
 
 def read_dae(data: bytes) -> list[Part]:
-    """Every instance of every geometry in the scene, in m, named by its node, its geometry and their ids.
+    """Every instance of every geometry in the scene, in m, named by its node, its geometry and
+    their ids.
 
     Dangling references are skipped, as in Gazebo. Raises NotXml and ValueError, and RecursionError
     if a node contains itself.
@@ -91,7 +93,9 @@ class _Document:
         return None if skin is None else self.named("geometry", skin.get("source"))
 
     def weight(self, element: Element, weights: dict[Element, int]) -> int:
-        """The approximate bytes of `element` with everything it places. Raises RecursionError if it contains itself."""
+        """The approximate bytes of `element` with everything it places. Raises RecursionError if it
+        contains itself.
+        """
         if element not in weights:
             target = self.target(element)
             parts = [*element, *([] if target is None else [target])]
@@ -101,7 +105,9 @@ class _Document:
         return weights[element]
 
     def placed(self, node: Element, outer: np.ndarray, name: str) -> Iterator[Part]:
-        """Everything that `node` places; `outer` (4, 4) is its parent's transform into m, `name` its parent's name."""
+        """Everything that `node` places; `outer` (4, 4) is its parent's transform into m, `name`
+        its parent's name.
+        """
         name = node.get("name") or name
         transform = outer
         for child in node:
@@ -117,7 +123,9 @@ class _Document:
                 yield from (_moved(part, transform, names) for part in self.parts_of(target))
 
     def parts_of(self, geometry: Element) -> list[Part]:
-        """The primitives of a geometry that have faces, in the file's unit and without names. Raises ValueError."""
+        """The primitives of a geometry that have faces, in the file's unit and without names.
+        Raises ValueError.
+        """
         if geometry not in self.geometries:
             parts = self.geometries[geometry] = []
             for primitive in (
@@ -156,7 +164,8 @@ def _vertex_input(primitive: Element) -> Element:
 
 
 def _polygons(primitive: Element) -> tuple[np.ndarray, np.ndarray]:
-    """The vertex indices of a primitive, one polygon, fan or strip after the other, and how many each has. Raises ValueError.
+    """The vertex indices of a primitive, one polygon, fan or strip after the other, and how many
+    each has. Raises ValueError.
 
     Holes of polygons are dropped.
     """
@@ -184,7 +193,9 @@ def _polygons(primitive: Element) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _triangles(counts: np.ndarray, *, strips: bool) -> np.ndarray:
-    """The triangles (M, 3) of polygons, or of strips, of so many corners that follow each other, by the places of these corners."""
+    """The triangles (M, 3) of polygons, or of strips, of so many corners that follow each other, by
+    the places of these corners.
+    """
     per_polygon = np.maximum(counts - 2, 0)
     first = np.repeat(np.cumsum(counts) - counts, per_polygon)
     step = np.arange(len(first)) - np.repeat(np.cumsum(per_polygon) - per_polygon, per_polygon)
@@ -196,7 +207,9 @@ def _triangles(counts: np.ndarray, *, strips: bool) -> np.ndarray:
 
 
 def _transform(element: Element) -> np.ndarray:
-    """The matrix (4, 4) of a child of a node; the identity if it is no transform. Raises ValueError."""
+    """The matrix (4, 4) of a child of a node; the identity if it is no transform. Raises
+    ValueError.
+    """
     matrix = np.eye(4)
     if element.tag == "matrix":
         matrix = _numbers(element).reshape(4, 4)
@@ -211,7 +224,9 @@ def _transform(element: Element) -> np.ndarray:
 
 
 def _rotation(x: float, y: float, z: float, angle: float) -> np.ndarray:
-    """The matrix (3, 3) that turns by `angle` rad about an axis of any length; one of length zero turns nothing."""
+    """The matrix (3, 3) that turns by `angle` rad about an axis of any length; one of length zero
+    turns nothing.
+    """
     length = math.hypot(x, y, z)
     if length == 0:
         return np.eye(3)

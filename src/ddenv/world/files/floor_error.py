@@ -1,4 +1,6 @@
-"""How well the convex pieces of a mesh block what the mesh itself blocks, on the floor at the height of a robot."""
+"""How well the convex pieces of a mesh block what the mesh itself blocks, on the floor at the
+height of a robot.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ from ddenv.world.pose import Pose
 # Between these heights above z = 0 most robots touch what is there, m.
 LOW = 0.03
 HIGH = 0.43
-# A larger share of the floor that a mesh spans is worth a warning, if it is also more than this many m^2.
+# A larger share of the floor that a mesh spans is worth a warning, if it is also more than this
+# many m^2.
 LARGE = 0.02
 LARGE_AREA = 0.01
 MOST_NAMES = 5
@@ -31,7 +34,9 @@ DOWN = (0.0, 0.0, -1.0)
 
 @dataclass(frozen=True, kw_only=True)
 class FloorError:
-    """Of a mesh in so many `pieces`: the `floor` that it spans, m^2, and the shares of it wrongly `blocked` and `free`."""
+    """Of a mesh in so many `pieces`: the `floor` that it spans, m^2, and the shares of it wrongly
+    `blocked` and `free`.
+    """
 
     model: str
     pieces: int
@@ -41,7 +46,9 @@ class FloorError:
 
 
 def floor_errors(models: Iterable[Model]) -> Iterator[FloorError]:
-    """The errors of all meshes of `models` that are cut into pieces, and reach the heights of a robot."""
+    """The errors of all meshes of `models` that are cut into pieces, and reach the heights of a
+    robot.
+    """
     for owner, link in ((model, link) for model in models for link in model.links):
         cut = ((one.piece, one) for one in link.collisions if one.piece is not None)
         for (mesh, _), group in groupby(cut, key=lambda pair: (pair[0].mesh, pair[1].name)):
@@ -54,7 +61,9 @@ def floor_errors(models: Iterable[Model]) -> Iterator[FloorError]:
 
 
 def _error(model: str, pieces: list[tuple[Piece, Collision]]) -> FloorError:
-    """The error of the mesh that is cut into `pieces`; its floor is 0 if it lies above or below a robot."""
+    """The error of the mesh that is cut into `pieces`; its floor is 0 if it lies above or below a
+    robot.
+    """
     piece, first = pieces[0]
     truth = _of_mesh(piece.mesh, first.pose @ piece.pose.inverse())
     solids = (
@@ -84,13 +93,16 @@ def note_pieces(world: World, among: Collection[str]) -> Iterator[tuple[str, str
     if wrong:
         yield (
             "pieces",
-            f"models whose convex pieces block the floor at {LOW:g} to {HIGH:g} m otherwise than their mesh: "
+            f"models whose convex pieces block the floor at {LOW:g} to {HIGH:g} m otherwise than "
+            "their mesh: "
             f"{first_of(wrong, MOST_NAMES)}",
         )
 
 
 def _of_mesh(mesh: Mesh, place: Pose) -> CrossSection:
-    """What the mesh blocks, seen from above: its solids, and the triangles of what encloses nothing."""
+    """What the mesh blocks, seen from above: its solids, and the triangles of what encloses
+    nothing.
+    """
     outlines: list[CrossSection] = []
     for part in connected_parts(_placed(mesh.vertices, place), mesh.faces.astype(np.int64)):
         solid = solid_of(part)

@@ -1,7 +1,8 @@
-"""Models and worlds of Gazebo Fuel: their URLs, and where gz-fuel-tools keeps those that were downloaded.
+"""Models and worlds of Gazebo Fuel: their URLs, and where gz-fuel-tools keeps those that were
+downloaded.
 
-The layout is that of LocalCache and ModelIdentifier in gz-fuel-tools: HOST/OWNER/models/NAME/VERSION, with owner and name in lower
-case.
+The layout is that of LocalCache and ModelIdentifier in gz-fuel-tools:
+HOST/OWNER/models/NAME/VERSION, with owner and name in lower case.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from ddenv.world.access import Unusable, folders_of, without_tilde
 # Fuel moved from the second to the first.
 HOSTS = ("fuel.gazebosim.org", "fuel.ignitionrobotics.org")
 KINDS = ("models", "worlds")
-# The variables that say where the caches of Gazebo and of Ignition Gazebo are, and where they are by default.
+# The variables that say where the caches of Gazebo and of Ignition Gazebo are, and where they are
+# by default.
 CACHES = {"GZ_FUEL_CACHE_PATH": "~/.gz/fuel", "IGN_FUEL_CACHE_PATH": "~/.ignition/fuel"}
 # The owner of Gazebo's own models in Fuel.
 GAZEBO = "openrobotics"
@@ -26,7 +28,9 @@ GAZEBO = "openrobotics"
 
 @dataclass(frozen=True)
 class FuelModel:
-    """A model or a world in Fuel (`kind` is one of KINDS). `version` is empty for the newest, which Fuel calls tip."""
+    """A model or a world in Fuel (`kind` is one of KINDS). `version` is empty for the newest, which
+    Fuel calls tip.
+    """
 
     owner: str
     kind: str
@@ -53,7 +57,8 @@ def quoted(name: str) -> str:
 
 
 def in_fuel(rest: str) -> tuple[FuelModel, str] | None:
-    """The model, and the file in it, that a URL names: HOST/1.0/OWNER/models/NAME[/VERSION][/files/FILE], decoded.
+    """The model, and the file in it, that a URL names:
+    HOST/1.0/OWNER/models/NAME[/VERSION][/files/FILE], decoded.
 
     None if it names none.
     """
@@ -81,7 +86,9 @@ def hosts() -> list[Path]:
 
 
 def cached(model: FuelModel) -> Iterator[Path]:
-    """Where the model can be in the caches: in the version that it names, or else in the newest one that is there."""
+    """Where the model can be in the caches: in the version that it names, or else in the newest one
+    that is there.
+    """
     for host in hosts():
         if model.version:
             yield host / model.folder / model.version

@@ -1,7 +1,7 @@
 """Downloads a model from Gazebo Fuel into its cache, where Gazebo finds it, too.
 
-What comes is not trusted: only https, within limits, and nothing is written outside of the cache. A version of a model is in the
-cache whole or not at all.
+What comes is not trusted: only https, within limits, and nothing is written outside of the cache. A
+version of a model is in the cache whole or not at all.
 """
 
 from __future__ import annotations
@@ -76,7 +76,8 @@ class Archive:
 def download(model: FuelModel, shown: Shown) -> tuple[Path, Archive | None]:
     """Downloads a model into the first of Fuel's caches; returns its folder there, and what came.
 
-    A folder that is there already is left as it is: None. Raises Unusable, with nothing left behind.
+    A folder that is there already is left as it is: None. Raises Unusable, with nothing left
+    behind.
     """
     cache = caches()[0]
     try:
@@ -105,7 +106,8 @@ def _receive(model: FuelModel, file: Path, shown: Shown) -> Archive:
         version = response.headers.get(VERSION) or model.version
         if not re.fullmatch("[1-9][0-9]{0,8}", version) or model.version not in ("", version):
             raise Unusable(
-                f"the server sent version '{version[:20]}' in place of {model.version or 'the newest one'}"
+                f"the server sent version '{version[:20]}' in place of "
+                f"{model.version or 'the newest one'}"
             )
         digest = _copy(response, file, shown)
         if not zipfile.is_zipfile(file):
@@ -157,7 +159,9 @@ def _copy(response: HTTPResponse, file: Path, shown: Shown) -> str:
 
 
 def _unpack(file: Path, folder: Path) -> None:
-    """Writes the files of a zip file into the new `folder`; their checksums are compared as they are read."""
+    """Writes the files of a zip file into the new `folder`; their checksums are compared as they
+    are read.
+    """
     try:
         with zipfile.ZipFile(file) as zipped:
             entries = zipped.infolist()

@@ -1,8 +1,8 @@
 """Reads glTF 2.0 files (.gltf, .glb) with trimesh, in the axes of the file.
 
-glTF is Y-up, but Gazebo uses the coordinates of every format as they are, and lets the `<pose>` in the SDF turn the mesh
-upright. So do we. trimesh gets a header that holds only the shape: otherwise it would decode images, drop nodes below a
-camera, and misread what it does not support.
+glTF is Y-up, but Gazebo uses the coordinates of every format as they are, and lets the `<pose>` in
+the SDF turn the mesh upright. So do we. trimesh gets a header that holds only the shape: otherwise
+it would decode images, drop nodes below a camera, and misread what it does not support.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ _NOTHING = {"componentType": 5126, "count": 0, "type": "SCALAR"}
 def read_gltf(data: bytes, folder: Path, limit: int) -> list[Part]:
     """Every mesh of every node in the scene, named by its node and its mesh.
 
-    Also reads buffers in `folder`, of at most `limit` bytes each. Raises ValueError or Unusable, and any exception of
-    trimesh for malformed files.
+    Also reads buffers in `folder`, of at most `limit` bytes each. Raises ValueError or Unusable,
+    and any exception of trimesh for malformed files.
     """
     import trimesh
 
@@ -79,7 +79,9 @@ def _buffer(uri: str, folder: Path, limit: int) -> bytes:
 
 
 def _shape(header: Data, limit: int) -> Data:
-    """The header reduced to triangles and their transforms; a node's name is its number. Raises ValueError."""
+    """The header reduced to triangles and their transforms; a node's name is its number. Raises
+    ValueError.
+    """
     if compressed := [name for name in header.get("extensionsRequired", []) if "compress" in name]:
         raise ValueError(f"{compressed[0][:60]} is not supported; save it without compression")
     accessors = header["accessors"]
@@ -105,7 +107,8 @@ def _shape(header: Data, limit: int) -> Data:
         for each in mesh
         for number in (*each["attributes"].values(), each.get("indices"))
     }
-    # A node without the mesh if that has no triangles: trimesh would lose the transform for all nodes below.
+    # A node without the mesh if that has no triangles: trimesh would lose the transform for all
+    # nodes below.
     placing = [
         {"name": str(number)}
         | {key: node[key] for key in _PLACE if key in node}
@@ -126,7 +129,9 @@ def _shape(header: Data, limit: int) -> Data:
 
 
 def _primitives(mesh: Data, accessors: list[Data]) -> Iterator[Data]:
-    """The triangle primitives of a mesh, without normals, colours and materials. Raises ValueError."""
+    """The triangle primitives of a mesh, without normals, colours and materials. Raises
+    ValueError.
+    """
     for primitive in mesh["primitives"]:
         mode = primitive.get("mode", _TRIANGLES)
         position = primitive["attributes"].get("POSITION")

@@ -1,6 +1,7 @@
 """Reads the image of a `<heightmap>`, and packs its heights into bytes for the run file.
 
-As in Gazebo the brightest pixel is as high as the heightmap, black is 0, and the first row of the image has the greatest y.
+As in Gazebo the brightest pixel is as high as the heightmap, black is 0, and the first row of the
+image has the greatest y.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ def read_heights(path: Path) -> bytes:
             _check_size(*image.size)
             if image.mode == "F":
                 raise Unusable(
-                    "holds elevations in m; write it as a PNG of 16 bits, with the difference of heights as <size>"
+                    "holds elevations in m; write it as a PNG of 16 bits, with the difference of "
+                    "heights as <size>"
                 )
             wide = image.mode.startswith("I")
             samples = np.asarray(image) if wide else np.asarray(image.convert("RGB"))[:, :, 0]

@@ -1,4 +1,5 @@
-"""Keeps the pieces of meshes in the user's cache: cutting a fine mesh takes seconds, and the same mesh is in many worlds.
+"""Keeps the pieces of meshes in the user's cache: cutting a fine mesh takes seconds, and the same
+mesh is in many worlds.
 
 Only time depends on it. A run has its own copy, and what is damaged is cut again.
 """
@@ -22,7 +23,9 @@ RULES = 1
 
 
 def kept_file(vertices: Floats, faces: Integers, most: int) -> Path:
-    """Where the pieces of a mesh, at most `most`, are kept: in `$DDENV_HOME/cache`, or in the user's cache folder."""
+    """Where the pieces of a mesh, at most `most`, are kept: in `$DDENV_HOME/cache`, or in the
+    user's cache folder.
+    """
     home = os.environ.get("DDENV_HOME")
     folder = (
         Path(home) / "cache"

@@ -1,10 +1,13 @@
-"""Reads mesh files (obj, stl, dae, gltf, glb) as `Mesh`, and packs meshes into bytes for the run file.
+"""Reads mesh files (obj, stl, dae, gltf, glb) as `Mesh`, and packs meshes into bytes for the run
+file.
 
-Coordinates are as in Gazebo: the axes of the file whatever it says about "up", `<unit>` of a .dae applied, all instances of
-a scene placed and joined. Only the mesh file itself is opened, and the buffers of a .gltf.
+Coordinates are as in Gazebo: the axes of the file whatever it says about "up", `<unit>` of a .dae
+applied, all instances of a scene placed and joined. Only the mesh file itself is opened, and the
+buffers of a .gltf.
 
-Limitations: a .dae is refused if it has no scene, or if its positions have gaps. A .gltf is refused if it has no scene, or if
-it has triangle fans or compressed, sparse or quantized meshes. A text .stl is read up to its last `endsolid`.
+Limitations: a .dae is refused if it has no scene, or if its positions have gaps. A .gltf is refused
+if it has no scene, or if it has triangle fans or compressed, sparse or quantized meshes. A text
+.stl is read up to its last `endsolid`.
 """
 
 from __future__ import annotations
@@ -79,8 +82,8 @@ def build(
 ) -> bytes:
     """The mesh of all `parts`, or of those called `submesh`, packed.
 
-    It is centred as by `surface_of`. A `convex` mesh, and one of more than `MOST_DRAWN` faces, is replaced by its hull.
-    Raises Unusable.
+    It is centred as by `surface_of`. A `convex` mesh, and one of more than `MOST_DRAWN` faces, is
+    replaced by its hull. Raises Unusable.
     """
     vertices, faces = surface_of(parts, submesh, center)
     too_fine = not convex and len(faces) > MOST_DRAWN
@@ -97,7 +100,8 @@ def build(
 
 
 def surface_of(parts: list[Part], submesh: str, center: bool) -> Surface:
-    """Vertices (N, 3) m and faces (M, 3) of all `parts`, or of those called `submesh`. Raises Unusable.
+    """Vertices (N, 3) m and faces (M, 3) of all `parts`, or of those called `submesh`. Raises
+    Unusable.
 
     `center` moves the middle of its bounding box to the origin.
     """
@@ -126,7 +130,9 @@ def _check(vertices: np.ndarray, faces: np.ndarray) -> None:
 
 
 def pack(vertices: np.ndarray, faces: np.ndarray, *, simplified: bool = False) -> bytes:
-    """Header, vertices and faces as little-endian bytes; vertices in 32 bits if that loses no precision, as for most files."""
+    """Header, vertices and faces as little-endian bytes; vertices in 32 bits if that loses no
+    precision, as for most files.
+    """
     short = vertices.astype("<f4")
     kept = short if np.array_equal(short.astype("<f8"), vertices) else vertices.astype("<f8")
     header = _HEADER.pack(
@@ -184,19 +190,23 @@ def unpack_pieces(name: str, packed: bytes) -> list[Mesh]:
 
 # Maximum number of vertices: a finer hull only makes every time step slower.
 MOST_VERTICES = 256
-# A hull thinner than `THIN_RATIO` of its size is thickened to `THICKNESS` m, or to `THICKNESS_RATIO` of a large size.
+# A hull thinner than `THIN_RATIO` of its size is thickened to `THICKNESS` m, or to
+# `THICKNESS_RATIO` of a large size.
 THIN_RATIO = 1e-5
 THICKNESS = 1e-3
 THICKNESS_RATIO = 1e-4
-# Of more points only the most extreme ones count: Qhull takes 10 s and 300 MB for so many on a ball.
+# Of more points only the most extreme ones count: Qhull takes 10 s and 300 MB for so many on a
+# ball.
 MANY_POINTS = 300_000
 CHUNK = 20_000  # points at a time
 
 
 def convex_hull(points: np.ndarray) -> Surface:
-    """Vertices (maximum `MOST_VERTICES`) and outward faces of the convex hull of `points` (N, 3), m.
+    """Vertices (maximum `MOST_VERTICES`) and outward faces of the convex hull of `points` (N, 3),
+    m.
 
-    Points in one plane, line or place get a hull that is 1 mm thick. Raises ValueError if there is no hull.
+    Points in one plane, line or place get a hull that is 1 mm thick. Raises ValueError if there is
+    no hull.
     """
     if len(points) > MANY_POINTS:
         points = points[_extremes(points)]
@@ -213,7 +223,9 @@ def convex_hull(points: np.ndarray) -> Surface:
 
 
 def _qhull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The indices of the points that are vertices, and the faces as indices into these. Raises ValueError."""
+    """The indices of the points that are vertices, and the faces as indices into these. Raises
+    ValueError.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -229,7 +241,9 @@ def _qhull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _unit(points: np.ndarray) -> np.ndarray:
-    """`points` stretched to the cube from -1 to 1, which suits Qhull's tolerances; a hull stays a hull."""
+    """`points` stretched to the cube from -1 to 1, which suits Qhull's tolerances; a hull stays a
+    hull.
+    """
     low = points.min(axis=0)
     high = points.max(axis=0)
     half = np.where(high > low, (high - low) / 2, 1.0)
@@ -237,7 +251,9 @@ def _unit(points: np.ndarray) -> np.ndarray:
 
 
 def _extremes(points: np.ndarray) -> np.ndarray:
-    """Indices of the extreme points in `MOST_VERTICES` directions: a spiral on the sphere, and the axes, for the bounding box."""
+    """Indices of the extreme points in `MOST_VERTICES` directions: a spiral on the sphere, and the
+    axes, for the bounding box.
+    """
     points = _unit(points)
     directions: list[Vector] = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
     turn = math.pi * (3 - math.sqrt(5))
@@ -263,7 +279,8 @@ def _extremes(points: np.ndarray) -> np.ndarray:
 def _thin_axes(points: np.ndarray, limit: float) -> list[np.ndarray]:
     """Perpendicular unit vectors along which the extent of `points` is `limit` at most, m.
 
-    Found from successive farthest points, not by a decomposition: sums over all points may differ between machines.
+    Found from successive farthest points, not by a decomposition: sums over all points may differ
+    between machines.
     """
     start = points[_length(points - points[0]).argmax()]
     offsets = points - start

@@ -1,9 +1,10 @@
 """Cuts a mesh into convex pieces, with the space between its parts: doors, the room below a table.
 
-Each connected part that encloses a solid is cut along planes of its own faces, where it is concave, until each piece fills its
-convex hull. So walls at right angles become boxes, exactly. Of a part that encloses nothing, each flat area becomes a thin
-plate below it; a curved one with many triangles becomes the hulls of small patches. Manifold (github.com/elalish/manifold) does
-the geometry. A run stores its pieces, so that its bits depend on no other machine's.
+Each connected part that encloses a solid is cut along planes of its own faces, where it is concave,
+until each piece fills its convex hull. So walls at right angles become boxes, exactly. Of a part
+that encloses nothing, each flat area becomes a thin plate below it; a curved one with many
+triangles becomes the hulls of small patches. Manifold (github.com/elalish/manifold) does the
+geometry. A run stores its pieces, so that its bits depend on no other machine's.
 """
 
 from __future__ import annotations
@@ -29,8 +30,10 @@ from ddenv.world.pose import Vector
 
 # A piece that leaves at most this share of its hull empty is that hull.
 EMPTY = 0.002
-# So is one that leaves at most so much empty, m^3 (a cube of 4 cm), or this share of the whole mesh's hull, whichever is less.
-# Beyond `MANY` cuts this grows with the square of their number: what is finer costs more time than it is worth.
+# So is one that leaves at most so much empty, m^3 (a cube of 4 cm), or this share of the whole
+# mesh's hull, whichever is less.
+# Beyond `MANY` cuts this grows with the square of their number: what is finer costs more time than
+# it is worth.
 LITTLE = 6e-5
 LITTLE_SHARE = 3e-4
 MANY = 64
@@ -48,14 +51,17 @@ CHECKED_TRIANGLES = 20_000
 # A finer part is simplified, by at most so many m, since each of its cuts takes long.
 MOST_TRIANGLES = 4_000
 SIMPLER = 0.01
-# Triangles times planes that are looked at for one mesh, some 20 s: what is not cut by then is its hull.
+# Triangles times planes that are looked at for one mesh, some 20 s: what is not cut by then is its
+# hull.
 MOST_WORK = 10_000_000
 # A plane's unit normal (3,), and its distance from the origin along that, m.
 Plane = tuple[Floats, float]
 
 
 def build_pieces(parts: list[Part], submesh: str, center: bool, scale: Vector, most: int) -> bytes:
-    """The convex pieces, at most `most`, of what `build` takes from these arguments, times `scale`; packed. Raises Unusable."""
+    """The convex pieces, at most `most`, of what `build` takes from these arguments, times `scale`;
+    packed. Raises Unusable.
+    """
     vertices, faces = surface_of(parts, submesh, center)
     vertices = vertices * np.array(scale)
     kept = kept_file(vertices, faces, most)
@@ -71,7 +77,9 @@ def build_pieces(parts: list[Part], submesh: str, center: bool, scale: Vector, m
 
 
 def convex_pieces(vertices: Floats, faces: Integers, most: int) -> list[Surface]:
-    """The convex pieces of a mesh, at most `most`, in m; a single one is its hull. Raises ValueError if there is no hull."""
+    """The convex pieces of a mesh, at most `most`, in m; a single one is its hull. Raises
+    ValueError if there is no hull.
+    """
     whole = convex_hull(vertices[np.unique(faces)])
     parts = connected_parts(vertices, faces)
     solids: list[Manifold] = []
@@ -133,7 +141,9 @@ def _is_closed(faces: Integers) -> bool:
 
 
 def _wound_alike(part: trimesh.Trimesh) -> Integers:
-    """The faces of `part`, each turned so that it runs along an edge in the other direction than its neighbour there."""
+    """The faces of `part`, each turned so that it runs along an edge in the other direction than
+    its neighbour there.
+    """
     first, second = part.face_adjacency.T
     edges = part.face_adjacency_edges
     alike = _runs_along(part.faces[first], edges) == _runs_along(part.faces[second], edges)
@@ -149,7 +159,9 @@ def _wound_alike(part: trimesh.Trimesh) -> Integers:
 
 
 def _runs_along(faces: Integers, edges: Integers) -> Booleans:
-    """Whether each of `faces` (N, 3) has its own one of `edges` (N, 2) from start to end, not from end to start."""
+    """Whether each of `faces` (N, 3) has its own one of `edges` (N, 2) from start to end, not from
+    end to start.
+    """
     after = np.roll(faces, -1, axis=1)
     along: Booleans = ((faces == edges[:, :1]) & (after == edges[:, 1:])).any(axis=1)
     return along
@@ -176,7 +188,9 @@ def _plates(part: trimesh.Trimesh) -> Iterator[Manifold]:
 
 
 def extruded(outlines: Iterable[Floats], height: float) -> Surface:
-    """The surface of what outlines (N, 2) m enclose, from z = 0 up to `height` m; what lies in two of them is a hole."""
+    """The surface of what outlines (N, 2) m enclose, from z = 0 up to `height` m; what lies in two
+    of them is a hole.
+    """
     return _triangles(CrossSection(list(outlines), FillRule.EvenOdd).extrude(height))
 
 
@@ -186,7 +200,8 @@ def union(outlines: Iterable[CrossSection]) -> CrossSection:
 
 
 def _cut(solids: Iterable[Manifold], most: int, little: float) -> list[Manifold]:
-    """The hulls of the convex pieces of `solids`: what fills its hull least is cut first, with `most` cuts.
+    """The hulls of the convex pieces of `solids`: what fills its hull least is cut first, with
+    `most` cuts.
 
     What leaves `little` (m^3) empty is not cut.
     """
@@ -224,7 +239,9 @@ def _cut(solids: Iterable[Manifold], most: int, little: float) -> list[Manifold]
 
 
 def _halves(solid: Manifold, planes: list[Plane]) -> list[Manifold]:
-    """Both sides of the one of `planes` that leaves least empty in the hulls of what it parts; none if none cuts `solid`."""
+    """Both sides of the one of `planes` that leaves least empty in the hulls of what it parts; none
+    if none cuts `solid`.
+    """
     best: list[Manifold] = []
     least = np.inf
     for normal, height in planes:
@@ -239,7 +256,9 @@ def _halves(solid: Manifold, planes: list[Plane]) -> list[Manifold]:
 
 
 def _planes(solid: Manifold) -> list[Plane]:
-    """Planes along which `solid` can be cut: those of faces that meet in a concave edge, the ones with the longest edges first."""
+    """Planes along which `solid` can be cut: those of faces that meet in a concave edge, the ones
+    with the longest edges first.
+    """
     vertices, faces = _triangles(solid)
     size = float(np.ptp(vertices, axis=0).max())
     normals, points, lengths = _concave_edges(vertices, faces, CONCAVE * size)
@@ -249,16 +268,19 @@ def _planes(solid: Manifold) -> list[Plane]:
     total = np.bincount(same.reshape(-1), lengths, len(planes))
     most = int(np.clip(CHECKED_TRIANGLES / len(faces), FEWEST_PLANES, MOST_PLANES))
     longest = first[np.argsort(-total, kind="stable")[:most]]
-    # Just beyond the face: a cut in its own plane could leave what it parts joined by triangles without area.
+    # Just beyond the face: a cut in its own plane could leave what it parts joined by triangles
+    # without area.
     return [(normals[edge], float(heights[edge] + BEYOND * size)) for edge in longest]
 
 
 def _concave_edges(
     vertices: Floats, faces: Integers, least: float
 ) -> tuple[Floats, Floats, Floats]:
-    """The edges of a closed surface at which a face rises more than `least` (m) above the plane of its neighbour.
+    """The edges of a closed surface at which a face rises more than `least` (m) above the plane of
+    its neighbour.
 
-    For each, and from either side: the neighbour's unit normal (N, 3), a point of the edge (N, 3) m, and its length (N,) m.
+    For each, and from either side: the neighbour's unit normal (N, 3), a point of the edge (N, 3)
+    m, and its length (N,) m.
     """
     corners = vertices[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -295,7 +317,9 @@ def _triangles(solid: Manifold) -> Surface:
 
 
 def _patches(parts: list[Floats], most: int) -> list[Floats]:
-    """The corners (N, 3) m of patches of the triangles `parts` (M, 3, 3) m: the largest patch is halved until there are `most`."""
+    """The corners (N, 3) m of patches of the triangles `parts` (M, 3, 3) m: the largest patch is
+    halved until there are `most`.
+    """
     if not parts:
         return []
     triangles = np.concatenate(parts)

@@ -1,4 +1,5 @@
-"""The files that an SDF file refers to: found by URI and read from disk, or taken from what an earlier reading stored.
+"""The files that an SDF file refers to: found by URI and read from disk, or taken from what an
+earlier reading stored.
 
 Reading downloads nothing, and no URI leaves the folder it is relative to.
 """
@@ -71,11 +72,13 @@ class MeshPart:
 
 
 class Resources:
-    """Answers URIs in SDF files: from `taken`, the bytes read for earlier requests, or else from disk, if there are `folders`.
+    """Answers URIs in SDF files: from `taken`, the bytes read for earlier requests, or else from
+    disk, if there are `folders`.
 
-    `base` is the folder of the file that contains the URI; `folders` are from `search_roots`. Both methods raise Missing if there
-    is no such file, and Unusable if it cannot be used, or if its stored bytes are damaged. Equal requests return the same object.
-    Failures are kept too: a world may name one broken file a thousand times.
+    `base` is the folder of the file that contains the URI; `folders` are from `search_roots`. Both
+    methods raise Missing if there is no such file, and Unusable if it cannot be used, or if its
+    stored bytes are damaged. Equal requests return the same object. Failures are kept too: a world
+    may name one broken file a thousand times.
     """
 
     def __init__(
@@ -89,7 +92,8 @@ class Resources:
         self._pieces: dict[str, list[Mesh]] = {}
         self._heights: dict[str, Floats] = {}
         self._failed: dict[str, Missing | Unusable] = {}
-        # Collisions and visuals use the same files, and different parts of them; the longest known first.
+        # Collisions and visuals use the same files, and different parts of them; the longest known
+        # first.
         self._parts_of: dict[Path, list[Part]] = {}
         # All requests so far: the URI, and its base.
         self.asked: dict[tuple[str, Path], None] = {}
@@ -121,7 +125,9 @@ class Resources:
         return self._meshes[key]
 
     def pieces(self, part: MeshPart, scale: Vector, most: int) -> list[Mesh]:
-        """The convex pieces of a mesh, in m and times `scale`, at most `most`; a mesh that is convex is a single one."""
+        """The convex pieces of a mesh, in m and times `scale`, at most `most`; a mesh that is
+        convex is a single one.
+        """
         key = part.key("pieces", scale, most)
         if key not in self._pieces:
             packed = self._bytes(key, lambda: _cut(self._parts(part), part, scale, most))
@@ -129,7 +135,9 @@ class Resources:
         return self._pieces[key]
 
     def heights(self, part: MeshPart) -> Floats:
-        """The heights (R, C) in an image, as a share of the greatest; the first row has the least y."""
+        """The heights (R, C) in an image, as a share of the greatest; the first row has the least
+        y.
+        """
         self.asked[part.uri, part.base] = None
         return self._unpacked(
             part.key("heightmap"),
@@ -137,7 +145,9 @@ class Resources:
         )
 
     def ground(self, part: MeshPart, scale: Vector) -> Floats:
-        """The heights (R, C) of a mesh that is ground, times `scale`, as a share of those of the box around it."""
+        """The heights (R, C) of a mesh that is ground, times `scale`, as a share of those of the
+        box around it.
+        """
         key = part.key("ground", scale)
         if key not in self.taken and not self._reads_disk:
             raise Unusable("was no ground when the world was read")
@@ -149,7 +159,9 @@ class Resources:
         return self._heights[key]
 
     def config_fault(self, folder: Path) -> str:
-        """Why the model.config in the folder of a model cannot be read, so that its model.sdf is taken; empty if it can."""
+        """Why the model.config in the folder of a model cannot be read, so that its model.sdf is
+        taken; empty if it can.
+        """
         key = json.dumps(["config", str(folder)])
         if key not in self.taken and self._reads_disk:
             try:
@@ -161,7 +173,9 @@ class Resources:
         return self.taken.get(key, b"").decode("utf-8", "replace")
 
     def rename(self, uri: str, folder: str, new: str, new_folder: str) -> None:
-        """Makes the meshes and images called `uri` in files of `folder` also known as `new` in files of `new_folder`."""
+        """Makes the meshes and images called `uri` in files of `folder` also known as `new` in
+        files of `new_folder`.
+        """
         for key, content in list(self.taken.items()):
             kind, *names = json.loads(key)
             if kind in ("mesh", "pieces", "heightmap", "ground") and names[:2] == [uri, folder]:
@@ -169,7 +183,8 @@ class Resources:
 
     def _bytes(self, key: str, from_disk: Callable[[], bytes]) -> bytes:
         if key in self._failed:
-            # A new exception each time: an exception raised again would collect a traceback of all its uses.
+            # A new exception each time: an exception raised again would collect a traceback of all
+            # its uses.
             raise type(self._failed[key])(str(self._failed[key]))
         if key not in self.taken:
             if not self._reads_disk:
@@ -248,9 +263,11 @@ _TEXTS = {
     "sun": "<light name='sun' type='directional'/>",
     "ground_plane": (
         "<model name='ground_plane'><static>true</static><link name='link'>"
-        "<collision name='collision'><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>"
+        "<collision name='collision'><geometry><plane><normal>0 0 1</normal><size>100 "
+        "100</size></plane></geometry>"
         "<surface><friction><ode><mu>100</mu><mu2>50</mu2></ode></friction></surface></collision>"
-        "<visual name='visual'><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>"
+        "<visual name='visual'><geometry><plane><normal>0 0 1</normal><size>100 "
+        "100</size></plane></geometry>"
         "<material><script><name>Gazebo/Grey</name></script></material></visual></link></model>"
     ),
 }
@@ -268,7 +285,9 @@ _ABSENT = (errno.ENOENT, errno.ENOTDIR)
 
 
 def model_named(uri: str) -> str:
-    """The model that `uri` names, such as `construction_barrel`, as its folder in Gazebo is called; "" if it names none."""
+    """The model that `uri` names, such as `construction_barrel`, as its folder in Gazebo is called;
+    "" if it names none.
+    """
     scheme, rest = _decoded(uri)
     name = ""
     if scheme in ("model", "package"):
@@ -279,14 +298,18 @@ def model_named(uri: str) -> str:
 
 
 def fuel_model(uri: str) -> FuelModel | None:
-    """The model in Fuel that `uri`, or the file that it names, belongs to; None if it is no such URL."""
+    """The model in Fuel that `uri`, or the file that it names, belongs to; None if it is no such
+    URL.
+    """
     scheme, rest = _decoded(uri)
     found = in_fuel(rest) if scheme in ("http", "https") else None
     return None if found is None else found[0]
 
 
 def how_to_fetch(uris: Iterable[str]) -> str:
-    """What downloads those of the missing `uris` that are in Fuel, as the end of a sentence; empty if none is."""
+    """What downloads those of the missing `uris` that are in Fuel, as the end of a sentence; empty
+    if none is.
+    """
     models = [model for model in map(fuel_model, uris) if model is not None]
     commands = [
         f"gz fuel download -u {url}" for url in dict.fromkeys(model.url for model in models)
@@ -298,7 +321,8 @@ def how_to_fetch(uris: Iterable[str]) -> str:
 
 
 def find(uri: str, base: Path, folders: Collection[Path]) -> Path:
-    """The file or folder that `uri`, in a file of the folder `base`, refers to; `folders` are from `search_roots`.
+    """The file or folder that `uri`, in a file of the folder `base`, refers to; `folders` are from
+    `search_roots`.
 
     Raises Missing if there is none, and Unusable if the URI is invalid or not supported.
     """
@@ -379,7 +403,9 @@ def _downloaded(rest: str, folders: Collection[Path]) -> Path:
 
 
 def _cached(path: str) -> Iterator[Path]:
-    """`path`, which begins with a model's name, in the newest version of each such model in Fuel's caches."""
+    """`path`, which begins with a model's name, in the newest version of each such model in Fuel's
+    caches.
+    """
     name, _, rest = path.partition(os.sep)
     for host in hosts():
         for owner in sorted(folders_of(host), key=lambda each: each != GAZEBO):
@@ -388,7 +414,9 @@ def _cached(path: str) -> Iterator[Path]:
 
 
 def of_name(name: str, folders: Collection[Path]) -> Iterator[Path]:
-    """Folders called `name` in any of `folders`; then those that differ only in case, or in `_` for a space."""
+    """Folders called `name` in any of `folders`; then those that differ only in case, or in `_` for
+    a space.
+    """
     for folder in folders:
         yield folder / name
     for folder in folders:
@@ -400,7 +428,9 @@ def _plain(name: str) -> str:
 
 
 def _first(candidates: Iterable[Path], where: str) -> Path:
-    """The first candidate that exists. Raises Missing, or Unusable if one that is not accessible may be it."""
+    """The first candidate that exists. Raises Missing, or Unusable if one that is not accessible
+    may be it.
+    """
     problem = ""
     for path in candidates:
         try:
@@ -422,10 +452,11 @@ def _listed(folders: Collection[Path]) -> str:
 
 
 def model_file(folder: Path) -> Path:
-    """The SDF file of a model's folder: the newest supported one in its model.config, or else model.sdf.
+    """The SDF file of a model's folder: the newest supported one in its model.config, or else
+    model.sdf.
 
-    Raises Unusable if a model.config cannot be read and there is no model.sdf, or if it names a file outside of the folder;
-    Missing if there is no SDF file.
+    Raises Unusable if a model.config cannot be read and there is no model.sdf, or if it names a
+    file outside of the folder; Missing if there is no SDF file.
     """
     usual = folder / "model.sdf"
     try:
@@ -443,12 +474,16 @@ def model_file(folder: Path) -> Path:
 
 
 def _model_config(folder: Path) -> Element:
-    """The root of the model.config in `folder`. Raises Unusable if it cannot be read, and Missing if there is none."""
+    """The root of the model.config in `folder`. Raises Unusable if it cannot be read, and Missing
+    if there is none.
+    """
     return xml_root(read(_first([folder / "model.config"], ""), MODEL_CONFIG_LIMIT))
 
 
 def _newest_file(config: Element) -> str:
-    """The file for the newest supported SDF version that a model.config names; empty if there is none. Raises Unusable."""
+    """The file for the newest supported SDF version that a model.config names; empty if there is
+    none. Raises Unusable.
+    """
     name = ""
     newest = (-1, -1)
     for element in config.findall("sdf"):

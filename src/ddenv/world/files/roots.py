@@ -8,8 +8,9 @@ from pathlib import Path
 
 from ddenv.world.access import is_folder, without_tilde
 
-# The variables of Gazebo and ROS that list folders of models, and Gazebo Classic's folder of downloads, in the order in which they
-# are searched; and the part of each folder that holds the models.
+# The variables of Gazebo and ROS that list folders of models, and Gazebo Classic's folder of
+# downloads, in the order in which they are searched; and the part of each folder that holds the
+# models.
 PLACES = {
     "GZ_SIM_RESOURCE_PATH": "",
     "IGN_GAZEBO_RESOURCE_PATH": "",
@@ -26,7 +27,8 @@ MODELS = "models"
 
 
 def search_roots(model_path: Sequence[Path], world_folder: Path) -> dict[Path, str]:
-    """The folders searched for models, with what names each: `model_path`, those around the world, then Gazebo's and ROS'.
+    """The folders searched for models, with what names each: `model_path`, those around the world,
+    then Gazebo's and ROS'.
 
     They are absolute, exist, and are listed once.
     """
@@ -41,7 +43,9 @@ def search_roots(model_path: Sequence[Path], world_folder: Path) -> dict[Path, s
 
 
 def around(world_folder: Path) -> list[tuple[Path, str]]:
-    """The folders of models that go with a world: its own, `models` in it, and `models` beside `worlds`."""
+    """The folders of models that go with a world: its own, `models` in it, and `models` beside
+    `worlds`.
+    """
     folder = absolute(world_folder)
     # The nearest folder of worlds, if the world is in one.
     packages = [each.parent for each in (folder, *folder.parents) if each.name == WORLDS]
@@ -64,7 +68,9 @@ def absolute(path: Path) -> Path:
 
 
 def source_of(path: Path, roots: Mapping[Path, str]) -> tuple[str, Path]:
-    """What names the folder of `roots` in which `path` was found, and this folder; "" and its own folder if it is in none."""
+    """What names the folder of `roots` in which `path` was found, and this folder; "" and its own
+    folder if it is in none.
+    """
     found = [root for root in roots if absolute(path).is_relative_to(root)]
     nearest = max(found, key=lambda root: len(root.parts), default=path.parent)
     return roots.get(nearest, ""), nearest

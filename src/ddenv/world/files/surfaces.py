@@ -1,4 +1,6 @@
-"""Meshes that are ground: large open surfaces that each vertical line meets once become heights, as those of a heightmap."""
+"""Meshes that are ground: large open surfaces that each vertical line meets once become heights, as
+those of a heightmap.
+"""
 
 from __future__ import annotations
 

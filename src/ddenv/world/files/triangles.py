@@ -1,4 +1,6 @@
-"""Named parts of a mesh file, as every format's reader returns them; and the readers of the plain formats, OBJ and STL."""
+"""Named parts of a mesh file, as every format's reader returns them; and the readers of the plain
+formats, OBJ and STL.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +12,16 @@ from typing import Any
 
 import numpy as np
 
-# Maximum numbers in one file, whose few lines can place one geometry a million times. They bound time and memory.
+# Maximum numbers in one file, whose few lines can place one geometry a million times. They bound
+# time and memory.
 MOST_FACES = 2_000_000
 MOST_PARTS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One part of a mesh file: `vertices` (N, 3) m, `faces` (M, 3) vertex indices, counterclockwise from outside.
+    """One part of a mesh file: `vertices` (N, 3) m, `faces` (M, 3) vertex indices, counterclockwise
+    from outside.
 
     `names` are what a `<submesh>` may call it; the first is the one that Gazebo uses.
     """
@@ -28,13 +32,17 @@ class Part:
 
 
 def parts_of(meshes: Iterable[tuple[tuple[str, ...], Any]]) -> list[Part]:
-    """The parts among pairs of names and what trimesh loaded; point clouds and empty meshes are dropped. Raises ValueError."""
+    """The parts among pairs of names and what trimesh loaded; point clouds and empty meshes are
+    dropped. Raises ValueError.
+    """
     found = [(names, mesh) for names, mesh in meshes if len(getattr(mesh, "faces", ()))]
     return [used_part(names, mesh.vertices.view(np.ndarray), mesh.faces) for names, mesh in found]
 
 
 def used_part(names: tuple[str, ...], vertices: np.ndarray, faces: np.ndarray) -> Part:
-    """A part with only the vertices that its faces use, since many parts may share one long list. Raises ValueError."""
+    """A part with only the vertices that its faces use, since many parts may share one long list.
+    Raises ValueError.
+    """
     used, places = np.unique(faces, return_inverse=True)
     # trimesh does not check this, and numpy counts negative numbers from the end.
     if not 0 <= used[0] <= used[-1] < len(vertices):
@@ -45,7 +53,9 @@ def used_part(names: tuple[str, ...], vertices: np.ndarray, faces: np.ndarray) -
 
 
 def chosen(parts: Sequence[Part], name: str) -> list[Part]:
-    """The parts called `name`, or all if it is empty. Raises ValueError listing the existing names."""
+    """The parts called `name`, or all if it is empty. Raises ValueError listing the existing
+    names.
+    """
     if not name:
         return list(parts)
     for rank in range(max((len(part.names) for part in parts), default=0)):
@@ -73,14 +83,17 @@ def check_count(faces: int) -> None:
     """Raises ValueError for too many triangles."""
     if faces > MOST_FACES:
         raise ValueError(
-            f"has {faces / 1e6:.1f} million triangles; the maximum is {MOST_FACES / 1e6:g} million: simplify it"
+            f"has {faces / 1e6:.1f} million triangles; the maximum is {MOST_FACES / 1e6:g} "
+            "million: simplify it"
         )
 
 
 def read_obj(data: bytes) -> list[Part]:
-    """One part for each object and group (`o`, `g`) with faces; polygons become fans. Raises ValueError.
+    """One part for each object and group (`o`, `g`) with faces; polygons become fans. Raises
+    ValueError.
 
-    Not by trimesh: it misreads negative indices, the index 0 and white space, and joins the names of object and group.
+    Not by trimesh: it misreads negative indices, the index 0 and white space, and joins the names
+    of object and group.
     """
     check_count(data.count(b"\nf "))
     vertices: list[list[str]] = []
@@ -119,7 +132,9 @@ def read_obj(data: bytes) -> list[Part]:
 
 
 def read_stl(data: bytes) -> list[Part]:
-    """The triangles of a binary or ASCII file; STL has no units, so metres are assumed. Raises ValueError."""
+    """The triangles of a binary or ASCII file; STL has no units, so metres are assumed. Raises
+    ValueError.
+    """
     import trimesh
 
     end = 84 + 50 * int.from_bytes(data[80:84], "little")

@@ -1,4 +1,6 @@
-"""Assembles a model from its links and joints and those of its nested models, at the poses that `<state>` gives."""
+"""Assembles a model from its links and joints and those of its nested models, at the poses that
+`<state>` gives.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ from ddenv.world.sdf.xml import Element, complain, floats, name_of, numbers, tex
 
 # Maximum speed of a link at rest in `<state>`, m/s and rad/s.
 STILL = 0.01
-# Smallest difference between `<state>` and a model's own pose that counts as a move, m and sine of half the angle.
+# Smallest difference between `<state>` and a model's own pose that counts as a move, m and sine of
+# half the angle.
 MOVED = 0.001
 
 
@@ -36,7 +39,9 @@ class Saved:
 
 
 def assemble(part: Part, name: str, outer: Scope, entry: Element | None, context: Context) -> Model:
-    """The model of `part`, called by the unique `name`, with its `entry` in `<state>`. Raises UserError, also TooFar."""
+    """The model of `part`, called by the unique `name`, with its `entry` in `<state>`. Raises
+    UserError, also TooFar.
+    """
     context.model = name
     saved = Saved(element=part.at) if entry is None else _saved(entry, context)
     nominal = outer.placed(part)
@@ -103,7 +108,9 @@ class _Builder:
         self.poses: dict[str, LinkPose] = {}
 
     def add(self, spot: Spot, saved: Saved) -> None:
-        """Adds everything in the model at `spot`, whose entry in `<state>` is `saved`. Raises UserError."""
+        """Adds everything in the model at `spot`, whose entry in `<state>` is `saved`. Raises
+        UserError.
+        """
         scope = spot.scope
         self.context.assembled += 1
         if self.context.assembled > MOST_MODELS:
@@ -177,7 +184,9 @@ class _Builder:
 
 
 def _check_has_link(part: Part, scope: Scope) -> None:
-    """Raises UserError for a model that has none, except a static one (of a plugin), and one that holds other models."""
+    """Raises UserError for a model that has none, except a static one (of a plugin), and one that
+    holds other models.
+    """
     if not scope.parts and scope.element.find("link") is None and not _is_static(part):
         raise complain(part.element, "has no <link>")
 
@@ -200,7 +209,9 @@ def _note_move(poses: list[LinkPose], saved: Saved, context: Context) -> None:
 
 
 def state_entries(world: Element) -> dict[str, list[Element]]:
-    """The entries of models in the world's `<state>`, by name, in the file's order. Raises UserError."""
+    """The entries of models in the world's `<state>`, by name, in the file's order. Raises
+    UserError.
+    """
     states = world.findall("state")
     if len(states) > 1:
         raise complain(states[1], "a second <state>; a world may have only one")

@@ -1,8 +1,8 @@
 """Caster balls: a ball joint whose child is one sphere around the joint.
 
-Drake describes a ball joint by roll, pitch and yaw, which become singular where the ball has rolled through a quarter of a turn. A
-ball that rolls freely under a robot pulls at it with nothing but its own small inertia. So a sphere that slides without friction
-stands for it.
+Drake describes a ball joint by roll, pitch and yaw, which become singular where the ball has rolled
+through a quarter of a turn. A ball that rolls freely under a robot pulls at it with nothing but its
+own small inertia. So a sphere that slides without friction stands for it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ OFF_CENTRE = 0.01
 
 
 def without_ball_joints(model: Model, element: Element, context: Context) -> Model:
-    """`model`, with spheres that are fixed and have no friction in place of its caster balls; `element` is its `<model>`."""
+    """`model`, with spheres that are fixed and have no friction in place of its caster balls;
+    `element` is its `<model>`.
+    """
     balls = {joint.child: joint for joint in model.joints if _is_caster(joint, model)}
     if not balls:
         return model

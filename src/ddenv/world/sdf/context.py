@@ -1,4 +1,6 @@
-"""The context of reading one file: where other files come from, what the user allows, and the notes on unread elements."""
+"""The context of reading one file: where other files come from, what the user allows, and the notes
+on unread elements.
+"""
 
 from __future__ import annotations
 
@@ -18,18 +20,24 @@ from ddenv.world.sdf.standin import ALL_MISSING, AUTO, StandIn, matching, parse_
 from ddenv.world.sdf.xml import Element, complain, floats, parse, place
 from ddenv.world.tinyxml import strict_fault
 
-# Maximum number of models: a few files that include each other could ask for more than any machine can hold.
+# Maximum number of models: a few files that include each other could ask for more than any machine
+# can hold.
 MOST_MODELS = 50_000
 VERSIONS = ("1.4", "1.5", "1.6", "1.7", "1.8", "1.9", "1.10", "1.11", "1.12")
-# By parent: the children that need no note, since they are read or do not affect how a robot drives.
+# By parent: the children that need no note, since they are read or do not affect how a robot
+# drives.
 QUIET: dict[str, frozenset[str]] = {
     tag: frozenset(children.split())
     for tag, children in {
-        "world": "model include population state frame gravity light gui scene physics spherical_coordinates magnetic_field "
+        "world": "model include population state frame gravity light gui scene physics "
+        "spherical_coordinates magnetic_field "
         "atmosphere audio",
         "model": "link joint model include frame pose static self_collide allow_auto_disable",
         "include": "uri name pose placement_frame static",
-        "link": "pose inertial collision visual gravity self_collide kinematic light must_be_base_link velocity_decay",
+        "link": (
+            "pose inertial collision visual gravity self_collide kinematic light "
+            "must_be_base_link velocity_decay"
+        ),
         "inertial": "mass inertia pose density auto_inertia_params",
         "inertia": "ixx ixy ixz iyy iyz izz",
         "collision": "pose geometry surface max_contacts laser_retro density auto_inertia_params "
@@ -37,7 +45,8 @@ QUIET: dict[str, frozenset[str]] = {
         "surface": "friction bounce contact soft_contact",
         "friction": "ode bullet torsional",
         "bounce": "restitution_coefficient threshold",
-        "visual": "pose geometry material cast_shadows transparency laser_retro meta visibility_flags",
+        "visual": "pose geometry material cast_shadows transparency laser_retro meta "
+        "visibility_flags",
         "joint": "pose parent child axis axis2 physics thread_pitch screw_thread_pitch gearbox_ratio "
         "gearbox_reference_body",
         "axis": "xyz limit dynamics use_parent_model_frame initial_position",
@@ -107,11 +116,12 @@ MOST_NAMED = 5
 
 @dataclass(kw_only=True)
 class Context:
-    """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
+    """Settings, notes and caches of one reading. `model` is the name of the world's model being
+    read, for the notes.
 
-    `used` are the URIs of stand-ins that were asked for, `missing` the first errors of missing files by URI, which one message
-    lists, `unreadable` why those of these that were found cannot be used, `files` the parsed files, `guessed` what has a guessed
-    shape: the model, and the URI.
+    `used` are the URIs of stand-ins that were asked for, `missing` the first errors of missing
+    files by URI, which one message lists, `unreadable` why those of these that were found cannot be
+    used, `files` the parsed files, `guessed` what has a guessed shape: the model, and the URI.
     """
 
     resources: Resources
@@ -192,7 +202,9 @@ class Context:
         return tag in self.reading.ignore
 
     def stand_in(self, uri: str) -> tuple[str, StandIn] | None:
-        """The stand-in for `uri`, with the text that the user gave for it; None if there is none."""
+        """The stand-in for `uri`, with the text that the user gave for it; None if there is
+        none.
+        """
         key = matching(self.stand_ins, uri)
         if key is None or self.stand_ins[key] == AUTO:
             return None
@@ -233,7 +245,9 @@ def how_to_include(path: Path) -> str:
 
 
 def first_macro(root: Element) -> Element | None:
-    """The first element of xacro: with its usual prefix, or with one that the file gives to its namespace."""
+    """The first element of xacro: with its usual prefix, or with one that the file gives to its
+    namespace.
+    """
     prefixes = {"xacro"}
     for element in root.iter():
         prefixes |= {
@@ -272,7 +286,9 @@ def refuse(element: Element, tag: Ignorable, message: str) -> UserError:
 
 
 def note_unread(element: Element, context: Context) -> None:
-    """Notes every child of `element`, and of its plain substructures, that matters but is not read."""
+    """Notes every child of `element`, and of its plain substructures, that matters but is not
+    read.
+    """
     quiet = QUIET[element.tag]
     once: set[str] = set()
     for child in element:

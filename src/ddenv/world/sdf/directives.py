@@ -1,6 +1,8 @@
-"""Reads Drake's model directives (`.dmd.yaml`) as YAML nodes that know their place; opens the files that `add_directives` names.
+"""Reads Drake's model directives (`.dmd.yaml`) as YAML nodes that know their place; opens the files
+that `add_directives` names.
 
-Frames and models have the names that Drake gives them: `model::frame`, with a namespace before. What Drake refuses is refused.
+Frames and models have the names that Drake gives them: `model::frame`, with a namespace before.
+What Drake refuses is refused.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import FARTHEST
 
 Span = tuple[int, int]
-# Maximum number of directives: a few files that open each other could ask for more than any machine can hold.
+# Maximum number of directives: a few files that open each other could ask for more than any machine
+# can hold.
 MOST = 50_000
 WORLD = "world"
 WORLD_INSTANCE = "WorldModelInstance"
@@ -142,7 +145,9 @@ class Source:
         return number
 
     def pose(self, node: Node | None, *, with_base: bool = True) -> tuple[Node | None, Pose]:
-        """The `base_frame` of a transform, which may be missing, and its pose in that: m, and degrees. Raises UserError."""
+        """The `base_frame` of a transform, which may be missing, and its pose in that: m, and
+        degrees. Raises UserError.
+        """
         if node is None:
             return None, HERE
         keys = self.keys(node, "pose", ("base_frame",) * with_base + ("translation", "rotation"))
@@ -176,7 +181,9 @@ class Source:
 
 @dataclass(frozen=True, kw_only=True)
 class Directive:
-    """One directive: its `kind`, its values by key, and its place; `span` (start, end) are bytes of the outermost file."""
+    """One directive: its `kind`, its values by key, and its place; `span` (start, end) are bytes of
+    the outermost file.
+    """
 
     kind: str
     keys: Mapping[str, Node]
@@ -186,7 +193,9 @@ class Directive:
 
 
 class _Loader(yaml.SafeLoader):
-    """Composes nodes; an alias could stand for endless text, and without its anchor it stands for nothing."""
+    """Composes nodes; an alias could stand for endless text, and without its anchor it stands for
+    nothing.
+    """
 
     def compose_node(self, parent: Node | None, index: Any) -> Node | None:
         if self.check_event(yaml.AliasEvent):
@@ -198,8 +207,8 @@ class _Loader(yaml.SafeLoader):
 
 
 def opened(text: bytes, path: Path, context: Context) -> tuple[list[Directive], bytes | None]:
-    """The directives in `text`, the content of `path`, and of all that they open, in order; one text for all of them, if others
-    were opened. Raises UserError with file and line.
+    """The directives in `text`, the content of `path`, and of all that they open, in order; one
+    text for all of them, if others were opened. Raises UserError with file and line.
     """
     found: list[Directive] = []
     pieces = _open(_source(text, path), (path,), context, found)
@@ -214,7 +223,9 @@ def opened(text: bytes, path: Path, context: Context) -> tuple[list[Directive], 
 def _open(
     source: Source, files: tuple[Path, ...], context: Context, found: list[Directive]
 ) -> list[tuple[Span, str]]:
-    """Adds the directives of `source` to `found`; returns what to write in place of each `add_directives` of the outermost file."""
+    """Adds the directives of `source` to `found`; returns what to write in place of each
+    `add_directives` of the outermost file.
+    """
     pieces = []
     try:
         root = _Loader(source.text).get_single_node()
@@ -283,7 +294,9 @@ def _source(text: bytes, path: Path, namespace: str = "") -> Source:
 
 
 def spans_of(source: Source, listed: Any) -> list[tuple[Any, Span]]:
-    """The items of a list, or the pairs of keys and values, each with the text that goes with it: its dash or its comma, too."""
+    """The items of a list, or the pairs of keys and values, each with the text that goes with it:
+    its dash or its comma, too.
+    """
     found: list[tuple[Any, Span]] = []
     before = listed.start_mark.index
     for item in listed.value:

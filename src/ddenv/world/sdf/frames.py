@@ -1,4 +1,6 @@
-"""Poses of the named things in a model or world: SDF's pose frame semantics, of version 1.7 and older."""
+"""Poses of the named things in a model or world: SDF's pose frame semantics, of version 1.7 and
+older.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +56,9 @@ class Scope:
         return self._scopes[key]
 
     def is_left_out(self, part: Part) -> bool:
-        """Whether nothing is left of one of the `parts`, since all that it includes was left out."""
+        """Whether nothing is left of one of the `parts`, since all that it includes was left
+        out.
+        """
         if (
             part.element.find("link") is not None
             or next(part.element.iter("include"), None) is None
@@ -83,7 +87,10 @@ class Scope:
             if at in chain:
                 raise complain(
                     asker,
-                    f"the frames form a cycle: {shown([*list(chain)[list(chain).index(at) :], at])}",
+                    (
+                        "the frames form a cycle: "
+                        f"{shown([*list(chain)[list(chain).index(at) :], at])}"
+                    ),
                 )
             base, chain[at], asked_by = self._step(at, asked_by)
             at = base
@@ -94,7 +101,9 @@ class Scope:
         return pose
 
     def _step(self, name: str, asker: Element) -> tuple[str, Pose, Element]:
-        """The frame that `name` is placed relative to, its pose in that, and the element that says so. Raises UserError."""
+        """The frame that `name` is placed relative to, its pose in that, and the element that says
+        so. Raises UserError.
+        """
         thing = self.named.get(name)
         if thing is None:
             if (merged := self._merged(name)) is not None:
@@ -123,7 +132,9 @@ class Scope:
         )
 
     def place(self, holder: Element, default: str = "") -> Pose:
-        """The pose in the `<pose>` of `holder`, which is relative to the frame `default` unless it names one."""
+        """The pose in the `<pose>` of `holder`, which is relative to the frame `default` unless it
+        names one.
+        """
         element = holder.find("pose")
         return self._at(_named_in(element) or default, element, holder)
 
@@ -152,7 +163,8 @@ class Scope:
         return pose @ self.inside(part).pose(frame, part.at).inverse() if frame else pose
 
     def link(self, name: str, asker: Element) -> str | None:
-        """The link that the frame `name` of this model is attached to, such as `link` or `inner::link`; None if there is none.
+        """The link that the frame `name` of this model is attached to, such as `link` or
+        `inner::link`; None if there is none.
 
         Errors point at `asker`. Raises UserError.
         """
@@ -180,7 +192,9 @@ class Scope:
 
     @cached_property
     def canonical(self) -> str | None:
-        """The link that a model's own frame is attached to: its `canonical_link`, else its first link."""
+        """The link that a model's own frame is attached to: its `canonical_link`, else its first
+        link.
+        """
         named = self.element.get("canonical_link")
         first = self.element.find("link")
         if named:
@@ -219,7 +233,9 @@ def shown(names: list[str]) -> str:
 
 
 def pose_of(element: Element) -> Pose:
-    """The pose in a `<pose>`: roll, pitch, yaw (rad or degrees) or a quaternion. Raises UserError, also TooFar."""
+    """The pose in a `<pose>`: roll, pitch, yaw (rad or degrees) or a quaternion. Raises UserError,
+    also TooFar.
+    """
     if not text_of(element):
         return HERE
     form = (element.get("rotation_format") or "euler_rpy").strip()

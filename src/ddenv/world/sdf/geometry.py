@@ -51,7 +51,8 @@ DEFAULT_SIZES: dict[str, dict[str, tuple[float, ...]]] = {
     "polyline": {"height": (1.0,)},
     "sphere": {"radius": (1.0,)},
 }
-# The maximum number of convex pieces of one mesh, and that of libsdformat for <convex_decomposition> without a number.
+# The maximum number of convex pieces of one mesh, and that of libsdformat for
+# <convex_decomposition> without a number.
 MOST_PIECES = 512
 DEFAULT_HULLS = 16
 MOST_POINTS = 2_000  # of all outlines of a polyline; of a finer one the hull is taken
@@ -61,7 +62,8 @@ RANGE = f"sizes must be from {SMALLEST:g} to {LARGEST:g} m"
 
 @dataclass(frozen=True, kw_only=True)
 class Lost:
-    """A mesh that was not found, or is `unreadable`, and the reason; `word` is what the user wants in its place, as in `StandIn`.
+    """A mesh that was not found, or is `unreadable`, and the reason; `word` is what the user wants
+    in its place, as in `StandIn`.
 
     `scale` is its own, times that of its model.
     """
@@ -80,7 +82,8 @@ class Lost:
 
 
 def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed | Lost | None:
-    """The shape of a `<collision>` or `<visual>`; None if it is empty or left out. Raises UserError.
+    """The shape of a `<collision>` or `<visual>`; None if it is empty or left out. Raises
+    UserError.
 
     `scale` multiplies its sizes, along the shape's own axes.
     """
@@ -204,7 +207,9 @@ def _terrain(element: Element, context: Context, scale: Vector) -> Placed:
 
 
 def _ground(uri: str, shares: Floats, size: Vector, middle: Vector) -> Placed:
-    """The ground that `shares` (R, C) of the height of a box give, which has its bottom's `middle` (m) there."""
+    """The ground that `shares` (R, C) of the height of a box give, which has its bottom's `middle`
+    (m) there.
+    """
     digest = hashlib.blake2b(shares.tobytes(), digest_size=8).hexdigest()
     return Placed(Terrain(size[:2], shares * size[2], f"{uri} {digest} {size}"), Pose(middle))
 
@@ -212,7 +217,9 @@ def _ground(uri: str, shares: Floats, size: Vector, middle: Vector) -> Placed:
 def _solid(
     part: MeshPart, element: Element, parent: Element, context: Context, scale: Vector
 ) -> Placed:
-    """What collides in place of a mesh: its convex pieces, or its hull. Raises Missing, Unusable and UserError."""
+    """What collides in place of a mesh: its convex pieces, or its hull. Raises Missing, Unusable
+    and UserError.
+    """
     hull = _scaled_mesh(context.resources.mesh(part, convex=True), scale, element)
     most = _most_pieces(element, parent, context)
     try:
@@ -240,7 +247,9 @@ def _solid(
 
 
 def _most_pieces(element: Element, parent: Element, context: Context) -> int:
-    """The maximum number of convex pieces of the `<mesh>` of a collision; 1 for its hull. Raises UserError."""
+    """The maximum number of convex pieces of the `<mesh>` of a collision; 1 for its hull. Raises
+    UserError.
+    """
     wanted = element.get("optimization", "")
     if wanted == "convex_hull" or context.reading.mesh == "hull" or _is_turned(parent):
         return 1
@@ -251,7 +260,9 @@ def _most_pieces(element: Element, parent: Element, context: Context) -> int:
 
 
 def _is_turned(collision: Element) -> bool:
-    """Whether a joint turns the link of a `<collision>`: a wheel rolls on its hull, and what stands for it is found by that."""
+    """Whether a joint turns the link of a `<collision>`: a wheel rolls on its hull, and what stands
+    for it is found by that.
+    """
     link = collision.parent
     if link is None or link.parent is None:
         return False
@@ -271,8 +282,11 @@ def scaled(stand_in: Placed, scale: Vector, element: Element) -> Placed:
 
 
 def remedies(lost: Lost, siblings: Names) -> str:
-    """The error for a missing collision mesh, with all remedies; `siblings` are the kinds of other shapes in its link."""
-    # For model://barrel/meshes/barrel.dae name the model: one stand-in then covers all of its meshes.
+    """The error for a missing collision mesh, with all remedies; `siblings` are the kinds of other
+    shapes in its link.
+    """
+    # For model://barrel/meshes/barrel.dae name the model: one stand-in then covers all of its
+    # meshes.
     package = (
         "/".join(lost.uri.split("/")[:3])
         if lost.uri.startswith(("model://", "package://"))
@@ -293,7 +307,9 @@ def remedies(lost: Lost, siblings: Names) -> str:
 
 
 def _scaled(shape: Shape, scale: Vector, element: Element) -> Shape:
-    """`shape`, with its sizes along its own axes times `scale`. Raises UserError if it is too small or too large then."""
+    """`shape`, with its sizes along its own axes times `scale`. Raises UserError if it is too small
+    or too large then.
+    """
     match shape:
         case Mesh():
             return _scaled_mesh(shape, scale, element)
@@ -345,7 +361,9 @@ def _sizes(shape: Element) -> list[Any]:
 
 
 def _polyline(geometry: Element, context: Context, scale: Vector) -> Placed:
-    """All `<polyline>`s of a `<geometry>`, extruded upwards from z = 0; what lies in two of them is a hole. Raises UserError."""
+    """All `<polyline>`s of a `<geometry>`, extruded upwards from z = 0; what lies in two of them is
+    a hole. Raises UserError.
+    """
     elements = geometry.findall("polyline")
     (height,) = _sizes(elements[0])
     outlines = [

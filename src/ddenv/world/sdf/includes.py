@@ -23,10 +23,11 @@ STAND_IN = "stand-in "
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """A model inside another model or a world: its `<model>` (`element`), and the `<include>` that names it or itself (`at`).
+    """A model inside another model or a world: its `<model>` (`element`), and the `<include>` that
+    names it or itself (`at`).
 
-    `static` is the include's own setting, None without one. `files` are the chain of including files, outermost first. The links
-    and joints of a `merged` one belong to the model around it.
+    `static` is the include's own setting, None without one. `files` are the chain of including
+    files, outermost first. The links and joints of a `merged` one belong to the model around it.
     """
 
     element: Element
@@ -50,7 +51,9 @@ class Part:
 
 
 def included(include: Element, files: tuple[Path, ...], context: Context) -> Part | None:
-    """The model that `include` names by its URI; None if it is left out or missing. Raises UserError."""
+    """The model that `include` names by its URI; None if it is left out or missing. Raises
+    UserError.
+    """
     uri = text_of(include.find("uri"))
     if not uri:
         raise complain(include, "has no <uri>")
@@ -106,7 +109,9 @@ def _last_of(uri: str) -> str:
 
 
 def _root(include: Element, uri: str, context: Context) -> Element | None:
-    """The root of the included file; None if it is missing or broken (noted or remembered in `context`)."""
+    """The root of the included file; None if it is missing or broken (noted or remembered in
+    `context`).
+    """
     if uri in context.missing:
         return None
     given = context.stand_in(uri)
@@ -135,7 +140,8 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
         # Another folder would not help if the file is there.
         folder = "its folder with --model-path, " if is_missing else ""
         remedies = (
-            f"give {folder}a shape for it with --stand-in '{uri[:200]}=box:1,1,1' (m; or cylinder, sphere, ...), "
+            f"give {folder}a shape for it with --stand-in '{uri[:200]}=box:1,1,1' (m; or "
+            "cylinder, sphere, ...), "
             "have one guessed with --stand-in auto, or leave it out with --ignore include"
         )
         if not is_missing:

@@ -1,4 +1,6 @@
-"""Mass and inertia of moving links: from the file, or computed from their shapes where the file has none or impossible ones."""
+"""Mass and inertia of moving links: from the file, or computed from their shapes where the file has
+none or impossible ones.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,8 @@ HEAVIEST = 1e9  # accepted masses, kg
 THINNEST = 1e-3
 DENSEST = 1e6  # accepted densities, kg/m^3
 LEAST_MOMENT = 1e-15  # minimum principal moment of inertia, kg m^2
-# Drake's contacts cannot be solved for a link that turns or moves more easily than this mass, spread evenly over its shapes, kg.
+# Drake's contacts cannot be solved for a link that turns or moves more easily than this mass,
+# spread evenly over its shapes, kg.
 LIGHTEST_IN_CONTACT = 1e-5
 
 
@@ -46,7 +49,9 @@ def read_inertia(
     density: Sequence[float],
     context: Context,
 ) -> Inertia:
-    """The inertia of a moving link at `link_pose`, in the world frame; `density` (kg/m^3) has one entry per collision."""
+    """The inertia of a moving link at `link_pose`, in the world frame; `density` (kg/m^3) has one
+    entry per collision.
+    """
     evenly = partial(spread, collisions, density, link_pose)
     inertia = _given(link, link_pose, evenly, context)
     if all(isinstance(one.shape, Ground) for one in collisions):
@@ -145,7 +150,9 @@ def read_density(parent: Element, default: float) -> float:
 
 
 def _possible(moments: Vector, products: Vector) -> Vector | None:
-    """`moments`, slightly enlarged if only rounding makes them impossible, as for thin plates; None if no body can have them."""
+    """`moments`, slightly enlarged if only rounding makes them impossible, as for thin plates; None
+    if no body can have them.
+    """
     low, middle, high = _principal(moments, products)
     excess = high - low - middle
     if -1e-9 * high < excess < 1e-5 * high:
@@ -166,7 +173,9 @@ def _principal(moments: Vector, products: Vector) -> Vector:
 def spread(
     collisions: Sequence[Collision], density: Sequence[float], link_pose: Pose, mass: float | None
 ) -> Inertia:
-    """The inertia of solid shapes (overlaps count twice), scaled to `mass` (kg) unless that is None."""
+    """The inertia of solid shapes (overlaps count twice), scaled to `mass` (kg) unless that is
+    None.
+    """
     pairs = [
         (one, each)
         for one, each in zip(collisions, density, strict=True)
@@ -204,7 +213,9 @@ def _ball(link_pose: Pose, mass: float) -> Inertia:
 
 
 def solid(shape: Shape) -> tuple[float, np.ndarray, np.ndarray]:
-    """Volume (m^3), centre (3,) m, and inertia about it for a mass of 1 kg, shape (3, 3) m^2, in the shape's own frame."""
+    """Volume (m^3), centre (3,) m, and inertia about it for a mass of 1 kg, shape (3, 3) m^2, in
+    the shape's own frame.
+    """
     origin = np.zeros(3)
     match shape:
         case Box(size):

@@ -1,6 +1,7 @@
-"""Inside models (`reading.inside`): each collision of a model that never moves becomes a model of its own, such as `house/wall_12`,
-which a reduction can remove. What is written is the file's own text without these elements; models from other files are first
-copied into it, in place of their `<include>`.
+"""Inside models (`reading.inside`): each collision of a model that never moves becomes a model of
+its own, such as `house/wall_12`, which a reduction can remove. What is written is the file's own
+text without these elements; models from other files are first copied into it, in place of their
+`<include>`.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.includes import Part
 from ddenv.world.sdf.xml import Edit, Element, edited, place, tag_end, text_of
 
-# Elements and attributes by which others may name a link: then it stays where its last collision goes.
+# Elements and attributes by which others may name a link: then it stays where its last collision
+# goes.
 NAMING = ("joint", "frame", "gripper")
 REFERENCES = ("relative_to", "attached_to", "frame", "placement_frame", "expressed_in")
 
@@ -47,7 +49,10 @@ def opened(world: World, root: Element) -> World:
         elif model.name in world.anchors:
             closed = "other models depend on it"
         elif element.tag == "include" or element.find(".//include") is not None:
-            closed = "parts of it are in files that cannot be copied into this one; 'ddenv world convert' does it"
+            closed = (
+                "parts of it are in files that cannot be copied into this one; 'ddenv world "
+                "convert' does it"
+            )
         links = {} if closed else dict(_links(element))
         parts = [
             part for link in model.links if links for part in _parts(model, link, links[link.name])
@@ -83,7 +88,9 @@ def _links(element: Element, prefix: str = "") -> Iterator[tuple[str, Element]]:
 
 
 def _parts(model: Model, link: Link, element: Element) -> Iterator[Model]:
-    """The collisions of a link as models, each with its pieces, and with the visuals that are nearest to it."""
+    """The collisions of a link as models, each with its pieces, and with the visuals that are
+    nearest to it.
+    """
     named = {
         tag: {child.get("name"): child for child in element.findall(tag)}
         for tag in ("collision", "visual")
@@ -133,7 +140,8 @@ def _emptied(
     yield from (Shared(span, whole) for span in model.spans)
 
 
-# Children of an `<include>` that say which model it is; all others belong to the model, and win over the file's own.
+# Children of an `<include>` that say which model it is; all others belong to the model, and win
+# over the file's own.
 OF_INCLUDES = ("uri", "name", "placement_frame")
 # The maximum size of all copies, bytes: a small world may include a large file a thousand times.
 MOST_COPIED = 50_000_000
@@ -149,7 +157,8 @@ def has_includes(part: Part) -> bool:
 def with_copies(
     text: bytes, path: Path, scope: Scope, parts: Collection[Part], resources: Resources
 ) -> bytes:
-    """`text`, the content of the world `path`, with `parts` and all that they include written out; what cannot be copied stays.
+    """`text`, the content of the world `path`, with `parts` and all that they include written out;
+    what cannot be copied stays.
 
     `resources` learns where the meshes of the copies are.
     """
@@ -166,7 +175,9 @@ def with_copies(
 
 
 def _size(part: Part, scope: Scope, known: dict[int, int]) -> int:
-    """The bytes of a model with all that it includes; `known` has those of other models by the `id` of their element."""
+    """The bytes of a model with all that it includes; `known` has those of other models by the `id`
+    of their element.
+    """
     key = id(part.element)
     if key not in known:
         inner = scope.inside(part)
@@ -181,7 +192,9 @@ def _size(part: Part, scope: Scope, known: dict[int, int]) -> int:
 def _copies(
     part: Part, scope: Scope, text: bytes, folder: str, resources: Resources, moved: Moved
 ) -> Iterator[Edit]:
-    """The changes of `text`, the content of the file that names `part`; relative URIs in that file start in `folder`."""
+    """The changes of `text`, the content of the file that names `part`; relative URIs in that file
+    start in `folder`.
+    """
     if part.at is part.element:
         for inner in scope.inside(part).parts:
             yield from _copies(inner, scope.inside(part), text, folder, resources, moved)

@@ -1,4 +1,6 @@
-"""Reads the `<joint>`s between the links of one model, in the world frame, and finds the links that they name."""
+"""Reads the `<joint>`s between the links of one model, in the world frame, and finds the links that
+they name.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ from ddenv.world.sdf.xml import Element, complain, floats, name_of, number, numb
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal")
 LIMITED = ("revolute", "prismatic")
-# Simulators write "unlimited" as a number at least this large, or as -1; SDF's own default is infinite.
+# Simulators write "unlimited" as a number at least this large, or as -1; SDF's own default is
+# infinite.
 UNLIMITED = 1e15
 
 
@@ -28,10 +31,11 @@ class LinkPose:
 
 @dataclass(frozen=True, kw_only=True)
 class Spot:
-    """The place of a model or nested model with the frames `scope`: its own frame in the world, as in `LinkPose`.
+    """The place of a model or nested model with the frames `scope`: its own frame in the world, as
+    in `LinkPose`.
 
-    `prefix` begins the names of its links in the world, `scale` multiplies its sizes. It is `static` if it or a model around it
-    is: then its links are fixed to the world.
+    `prefix` begins the names of its links in the world, `scale` multiplies its sizes. It is
+    `static` if it or a model around it is: then its links are fixed to the world.
     """
 
     scope: Scope
@@ -43,7 +47,8 @@ class Spot:
 
 
 def read_joints(spot: Spot, links: dict[str, LinkPose], context: Context) -> list[Joint]:
-    """The joints directly inside the model at `spot`; `links` are all those of the outermost one, by full name.
+    """The joints directly inside the model at `spot`; `links` are all those of the outermost one,
+    by full name.
 
     Raises UserError.
     """
@@ -162,7 +167,9 @@ def _second_axis(element: Element, first: Vector, spot: Spot, joint_pose: Pose) 
 
 
 def _relative_to_start(joint: Joint, axis: Vector, links: dict[str, LinkPose]) -> Joint:
-    """`joint` with limits relative to the actual poses of its links; `axis` is at the nominal ones."""
+    """`joint` with limits relative to the actual poses of its links; `axis` is at the nominal
+    ones.
+    """
     if math.isinf(joint.lower) and math.isinf(joint.upper):
         return joint
     parent = links.get(joint.parent, LinkPose(Pose(), Pose()))
@@ -198,7 +205,9 @@ def _note_unread(element: Element, kind: str, context: Context) -> None:
 
 
 def _limit(limit: Element | None, tag: str, default: float) -> float:
-    """The number in child `tag` of `limit`, which may be infinite, or `default`. Raises UserError."""
+    """The number in child `tag` of `limit`, which may be infinite, or `default`. Raises
+    UserError.
+    """
     child = None if limit is None else limit.find(tag)
     if child is None:
         return default
@@ -212,7 +221,10 @@ def check_tree(joints: list[Joint], element: Element) -> None:
     parents: dict[str, list[str]] = {}
     for joint in joints:
         if joint.child in parents:
-            why = f"link '{joint.child}' is the child of two joints; only trees of links are supported"
+            why = (
+                f"link '{joint.child}' is the child of two joints; only trees of links are "
+                "supported"
+            )
             raise complain(element, why)
         parents[joint.child] = [joint.parent]
     try:

@@ -1,4 +1,6 @@
-"""The elements that the official SDF checker knows, and what it demands of their text (libsdformat 12: `Param.cc`)."""
+"""The elements that the official SDF checker knows, and what it demands of their text (libsdformat
+12: `Param.cc`).
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ _WHOLE = re.compile(r"\s*+[+-]?\d++")
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of a child: the attributes that it must have, the `kind` of its text, and whether that must not be empty."""
+    """What is known of a child: the attributes that it must have, the `kind` of its text, and
+    whether that must not be empty.
+    """
 
     attributes: tuple[str, ...]
     kind: str

@@ -1,4 +1,6 @@
-"""Reads a `<link>`: its collisions with their friction, its visuals with their colours, and its inertia, in the world frame."""
+"""Reads a `<link>`: its collisions with their friction, its visuals with their colours, and its
+inertia, in the world frame.
+"""
 
 from __future__ import annotations
 
@@ -55,7 +57,9 @@ GAZEBO_COLORS: dict[str, tuple[float, float, float]] = {
 
 
 def read_link(element: Element, spot: Spot, context: Context, pose: Pose, local: Pose) -> Link:
-    """The link of `element` in the model at `spot`, with its `pose` in the world, and `local` in its model. Raises UserError."""
+    """The link of `element` in the model at `spot`, with its `pose` in the world, and `local` in
+    its model. Raises UserError.
+    """
     note_unread(element, context)
     items = []
     for child in (child for child in element if child.tag in ("collision", "visual")):
@@ -114,7 +118,9 @@ class _Item:
 
 
 def _collisions(item: _Item, placed: Placed, pose: Pose, context: Context) -> list[Collision]:
-    """The shapes of a `<collision>` of the link at `pose`; none if nothing can touch it. Raises UserError."""
+    """The shapes of a `<collision>` of the link at `pose`; none if nothing can touch it. Raises
+    UserError.
+    """
     if not can_be_touched(item.element, context):
         return []
     mu = read_friction(item.element, context)
@@ -131,7 +137,9 @@ def _collisions(item: _Item, placed: Placed, pose: Pose, context: Context) -> li
 
 
 def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -> Placed | None:
-    """The shape of a collision, with a replacement for a missing mesh; None if nothing collides. Raises UserError."""
+    """The shape of a collision, with a replacement for a missing mesh; None if nothing collides.
+    Raises UserError.
+    """
     if not isinstance(item.shape, Lost):
         return item.shape
     lost = item.shape
@@ -177,7 +185,9 @@ def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -
 
 
 def _guessed(lost: Lost, item: _Item, link: Element, context: Context) -> Placed | None:
-    """A shape for a missing mesh whose link has no other visual shape to go by; None for a floor."""
+    """A shape for a missing mesh whose link has no other visual shape to go by; None for a
+    floor.
+    """
     guessed = guess(lost.uri, link)
     if guessed is None:
         context.note("ignored", lost.element, f"'{lost.uri}' {NO_FLOOR}")
@@ -216,7 +226,8 @@ def can_be_touched(collision: Element, context: Context) -> bool:
 
 
 def read_friction(collision: Element, context: Context) -> float:
-    """The Coulomb friction coefficient: Drake's own, else the smaller of SDF's two, which are for two directions.
+    """The Coulomb friction coefficient: Drake's own, else the smaller of SDF's two, which are for
+    two directions.
 
     Raises UserError.
     """
@@ -233,7 +244,10 @@ def read_friction(collision: Element, context: Context) -> float:
         return DEFAULT_MU
     first, second = (_friction(engine, name) for name in names)
     if first != second:
-        why = f"friction of {first:g} and {second:g} in two directions by {min(first, second):g} in both"
+        why = (
+            f"friction of {first:g} and {second:g} in two directions by {min(first, second):g} "
+            "in both"
+        )
         context.note("replaced", engine, why)
     return min(first, second)
 
@@ -249,7 +263,9 @@ def _friction(engine: Element, name: str) -> float:
 
 
 def read_color(visual: Element) -> Color | None:
-    """The diffuse colour, else the ambient one, else that of a known Gazebo material; None if there is none."""
+    """The diffuse colour, else the ambient one, else that of a known Gazebo material; None if there
+    is none.
+    """
     opacity = 1.0 - min(max(number(visual, "transparency", 0.0), 0.0), 1.0)
     for tag in ("material/diffuse", "material/ambient"):
         element = visual.find(tag)
@@ -258,7 +274,8 @@ def read_color(visual: Element) -> Color | None:
             red, green, blue, *alpha = (
                 min(max(value, 0.0), 1.0) for value in numbers(element, count)
             )
-            # Many files have colours with an alpha of zero, which the simulators that wrote them ignored.
+            # Many files have colours with an alpha of zero, which the simulators that wrote them
+            # ignored.
             return red, green, blue, ((alpha or [1.0])[0] or 1.0) * opacity
     name = text_of(visual.find("material/script/name")).removeprefix("Gazebo/")
     return (*GAZEBO_COLORS[name], opacity) if name in GAZEBO_COLORS else None

@@ -1,4 +1,6 @@
-"""Writes a world in which models have moved: its own text with other poses; all other bytes stay."""
+"""Writes a world in which models have moved: its own text with other poses; all other bytes
+stay.
+"""
 
 from __future__ import annotations
 
@@ -32,10 +34,12 @@ _SPACE = re.compile(rb"\s*")
 def with_places(
     world: World, places: Mapping[str, Sequence[Pose]], reading: Reading
 ) -> tuple[bytes, list[str]]:
-    """The text of `world` with the links of some models at `places`, and the names of those that could not be moved.
+    """The text of `world` with the links of some models at `places`, and the names of those that
+    could not be moved.
 
-    `places` are the poses of all links of a model in the world frame; `reading` is how the world was read. A model whose links
-    moved against each other can only be moved if `<state>` holds its links; one that others depend on stays.
+    `places` are the poses of all links of a model in the world frame; `reading` is how the world
+    was read. A model whose links moved against each other can only be moved if `<state>` holds its
+    links; one that others depend on stays.
     """
     asked = {name: there for name, there in places.items() if name not in world.anchors}
     wanted = link_poses(world)

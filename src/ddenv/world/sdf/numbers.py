@@ -1,5 +1,6 @@
-"""The numbers of a world and of its scenario, such as "green_patch_01.friction" and "spawn.yaw": which there are, how far each may
-change, and the world or scenario with another value; of the world's text only that number is changed.
+"""The numbers of a world and of its scenario, such as "green_patch_01.friction" and "spawn.yaw":
+which there are, how far each may change, and the world or scenario with another value; of the
+world's text only that number is changed.
 """
 
 from __future__ import annotations
@@ -39,14 +40,15 @@ from ddenv.world.whole import whole_of
 
 # Less than this part of a number does not matter, unless it is a place or an angle.
 PART = 0.05
-# Two models that never move may stand so deep in each other, m: barrels on thin patches of ground do.
+# Two models that never move may stand so deep in each other, m: barrels on thin patches of ground
+# do.
 SUNK = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """Of numbers in `unit`: less than `matters` does not matter, and `range` has the lowest and the highest value to try, from the
-    present one and the robot's length, m.
+    """Of numbers in `unit`: less than `matters` does not matter, and `range` has the lowest and the
+    highest value to try, from the present one and the robot's length, m.
     """
 
     unit: str
@@ -104,7 +106,8 @@ OPTIONS = "controller.options."
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Number:
-    """A number that may be changed: its value `now`, and the `low`est and `high`est value that are tried, in `unit`.
+    """A number that may be changed: its value `now`, and the `low`est and `high`est value that are
+    tried, in `unit`.
 
     A change is measured against `scale`; less than `resolution` does not matter.
     """
@@ -125,7 +128,9 @@ class NotPossible(ValueError):
 def numbers_of(
     scenario: Scenario, world: World, robot: Model, kept: Iterable[str]
 ) -> dict[str, Number]:
-    """The numbers by name, of the models `kept` and of the scenario. Those that promise most come first."""
+    """The numbers by name, of the models `kept` and of the scenario. Those that promise most come
+    first.
+    """
     box = bounds(robot.collisions)
     length = 1.0 if box is None else float((box[1] - box[0])[:2].max())
     # Those of directives stand in files of their own.
@@ -170,13 +175,16 @@ def numbers_of(
 
 
 def chosen(numbers: Mapping[str, Number], globs: Iterable[str]) -> list[Number]:
-    """The numbers whose names match, in their order; all without globs. Raises UserError for a glob that matches none."""
+    """The numbers whose names match, in their order; all without globs. Raises UserError for a glob
+    that matches none.
+    """
     globs = list(globs)
     for glob in globs:
         if not any(fnmatchcase(name, glob) for name in numbers):
             near = nearest(glob, numbers)
             raise UserError(
-                f"--number: there is no number '{glob}'{near}; examples: {', '.join(list(numbers)[:3])}"
+                f"--number: there is no number '{glob}'{near}; examples: "
+                f"{', '.join(list(numbers)[:3])}"
             )
     return [
         one
@@ -186,7 +194,9 @@ def chosen(numbers: Mapping[str, Number], globs: Iterable[str]) -> list[Number]:
 
 
 def _of_model(world: World, model: Model, what: str) -> float | None:
-    """A number of a model; None if it has none of that kind, or if it does not stand in the world's own text."""
+    """A number of a model; None if it has none of that kind, or if it does not stand in the world's
+    own text.
+    """
     if what in ("x", "y", "z", "yaw"):
         return model.pose.yaw() if what == "yaw" else model.pose.position["xyz".index(what)]
     if not world.text.startswith(b"<model", model.spans[0][0]):
@@ -236,7 +246,8 @@ def changed(
 def part_of(
     scenario: Scenario, world: World, kept: frozenset[str], changes: Mapping[str, float]
 ) -> tuple[Scenario, World]:
-    """The part of the world with the models `kept` and those that always stay, and with these values, as `ddenv export` writes it.
+    """The part of the world with the models `kept` and those that always stay, and with these
+    values, as `ddenv export` writes it.
 
     A simulator of the user's own leaves models out of the world's text itself. Raises NotPossible.
     """
@@ -257,8 +268,8 @@ def check(
     kept: frozenset[str],
     changes: Mapping[str, float],
 ) -> None:
-    """Raises NotPossible if numbers cannot have these values: then the robot stands in a model at its start, or a changed model in
-    another one that it did not stand in.
+    """Raises NotPossible if numbers cannot have these values: then the robot stands in a model at
+    its start, or a changed model in another one that it did not stand in.
     """
     try:
         there, after = part_of(scenario, world, kept, changes)
@@ -281,7 +292,9 @@ def check(
 
 
 def _with(scenario: Scenario, world: World, name: str, value: float) -> World:
-    """The world with a number of a model changed. What was written is read again: only that shows that it is there."""
+    """The world with a number of a model changed. What was written is read again: only that shows
+    that it is there.
+    """
     owner, _, what = name.rpartition(".")
     model = world.model(owner)
     at = next(one for one in parse(world.text, world.path).iter() if one.start == model.spans[0][0])
@@ -319,7 +332,9 @@ def _with(scenario: Scenario, world: World, name: str, value: float) -> World:
 
 
 def move_of(model: Model, what: str, value: float) -> Pose:
-    """How a model moves in the world where one of its x, y, z (m) and yaw (rad) has this value; not at all for other numbers."""
+    """How a model moves in the world where one of its x, y, z (m) and yaw (rad) has this value; not
+    at all for other numbers.
+    """
     turn = value - model.pose.yaw() if what == "yaw" else 0.0
     x, y, z = (
         value if axis == what else now for axis, now in zip("xyz", model.pose.position, strict=True)

@@ -1,4 +1,6 @@
-"""What the official SDF checker (`ign sdf -k`, libsdformat 12) refuses although we read it: in a world, and in what it includes."""
+"""What the official SDF checker (`ign sdf -k`, libsdformat 12) refuses although we read it: in a
+world, and in what it includes.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ from ddenv.world.sdf.inertia import moments_of, tensor_of
 from ddenv.world.sdf.known_elements import fault, known_children
 from ddenv.world.sdf.xml import Element, number_or_nan, parse, place, text_of
 
-# The checker's slack for rounded numbers, as a part of the greatest moment of inertia that the body can have.
+# The checker's slack for rounded numbers, as a part of the greatest moment of inertia that the body
+# can have.
 SLACK = 5 * float(np.finfo(float).eps)
 RESERVED_IN = frozenset(
     ["world", "model", "link", "joint", "frame", "collision", "visual", "light", "sensor", "actor"]
@@ -27,9 +30,12 @@ RESERVED_IN = frozenset(
 FRAMES = ("model", "link", "joint", "frame", "include")
 INCLUDABLE = ("model", "actor", "light")
 SENSORS = (
-    "air_pressure altimeter boundingbox boundingbox_camera camera contact custom depth depth_camera force_torque gps "
-    "gpu_lidar gpu_ray imu lidar logical_camera magnetometer multicamera navsat ray rfid rfidtag rgbd rgbd_camera "
-    "segmentation segmentation_camera sonar thermal thermal_camera wide_angle_camera wideanglecamera "
+    "air_pressure altimeter boundingbox boundingbox_camera camera contact custom depth "
+    "depth_camera force_torque gps "
+    "gpu_lidar gpu_ray imu lidar logical_camera magnetometer multicamera navsat ray rfid rfidtag "
+    "rgbd rgbd_camera "
+    "segmentation segmentation_camera sonar thermal thermal_camera wide_angle_camera "
+    "wideanglecamera "
     "wireless_receiver wireless_transmitter"
 )
 TYPES = {"light": frozenset(["point", "spot", "directional"]), "sensor": frozenset(SENSORS.split())}
@@ -37,7 +43,9 @@ Refusal = tuple[str, Element]
 
 
 def refused(world: World) -> list[tuple[str, str]]:
-    """What the official checker would refuse in `world`: the reason, and file, line and XPath; each file in its own order."""
+    """What the official checker would refuse in `world`: the reason, and file, line and XPath; each
+    file in its own order.
+    """
     if is_directives(world.path):
         return []
     checker = _Checker(Resources(world.resources))
@@ -46,7 +54,9 @@ def refused(world: World) -> list[tuple[str, str]]:
 
 @dataclass
 class _Checker:
-    """Reads included files, each once. `names` has what a world or model holds by name: a model, or None for anything else."""
+    """Reads included files, each once. `names` has what a world or model holds by name: a model, or
+    None for anything else.
+    """
 
     resources: Resources
     files: dict[Path, Element] = field(default_factory=dict)
@@ -63,7 +73,9 @@ class _Checker:
                     roots.append(included)
 
     def _inside(self, element: Element, no_colons: bool, *, is_known: bool) -> Iterator[Refusal]:
-        """What is refused below `element`. Nothing is known of what an element holds that is not `is_known` itself."""
+        """What is refused below `element`. Nothing is known of what an element holds that is not
+        `is_known` itself.
+        """
         yield from self._names(element, no_colons)
         if element.tag == "inertial" and not _is_accepted(element):
             yield "an inertia that no body has", element
@@ -73,7 +85,8 @@ class _Checker:
                 yield why, child
             if child.tag == "frame" and element.tag in ("world", "model"):
                 yield from self._frame(child, element)
-            # Nothing that belongs to a plugin or to an extension is looked at, and of an include what it opens.
+            # Nothing that belongs to a plugin or to an extension is looked at, and of an include
+            # what it opens.
             if child.tag not in ("plugin", "include") and ":" not in child.tag:
                 yield from self._inside(child, no_colons, is_known=child.tag in known)
 
@@ -155,7 +168,9 @@ class _Checker:
 
 
 def _is_accepted(inertial: Element) -> bool:
-    """Whether neither the mass nor a moment is negative, and no moment exceeds the sum of the other two."""
+    """Whether neither the mass nor a moment is negative, and no moment exceeds the sum of the other
+    two.
+    """
     inertia = inertial.find("inertia")
     if inertia is None:
         return True

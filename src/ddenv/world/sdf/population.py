@@ -1,4 +1,6 @@
-"""The copies that Gazebo Classic makes of the model in a `<population>`, at the places that its `Population.cc` gives them."""
+"""The copies that Gazebo Classic makes of the model in a `<population>`, at the places that its
+`Population.cc` gives them.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ COUNTS = {
 
 
 def copies(population: Element, files: tuple[Path, ...], context: Context) -> list[Part]:
-    """The models that `population` stands for. They share one text, so that none can be removed alone. Raises UserError."""
+    """The models that `population` stands for. They share one text, so that none can be removed
+    alone. Raises UserError.
+    """
     if context.ignores("population"):
         context.note("ignored", population, "left out by --ignore population")
         return []
@@ -43,7 +47,10 @@ def _places(population: Element) -> list[Vector]:
     """Where the copies stand, in the world frame, m."""
     kind = text_of(population.find("distribution/type"))
     if kind not in COUNTS:
-        why = f"only Gazebo Classic knows the places of a '{kind[:40]}' distribution; write its models out"
+        why = (
+            f"only Gazebo Classic knows the places of a '{kind[:40]}' distribution; write its "
+            "models out"
+        )
         raise refuse(population, "population", why)
     given = COUNTS[kind]
     counts = [int(number(population, path, 0)) if path else 1 for path in given]

@@ -1,8 +1,8 @@
 """Reads an SDF world or model file, or a URDF robot, into plain data (`ddenv.world.model`).
 
-We read SDF ourselves because Drake's parser refuses many files that simulators accept, and silently drops parts of others.
-This reader notes everything that it replaces or ignores (`World.notes`), and refuses what it does not understand, with file,
-line and XPath. It never guesses.
+We read SDF ourselves because Drake's parser refuses many files that simulators accept, and silently
+drops parts of others. This reader notes everything that it replaces or ignores (`World.notes`), and
+refuses what it does not understand, with file, line and XPath. It never guesses.
 """
 
 from __future__ import annotations
@@ -39,7 +39,9 @@ def read_world(path: Path, reading: Reading = PLAIN) -> World:
 def parse_world(
     text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None
 ) -> World:
-    """The world in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
+    """The world in `text`, the content of `path`; other files come from `resources`, by default
+    from disk. Raises UserError.
+    """
     context = Context(resources=resources or disk_of(path, reading), reading=reading)
     try:
         return (
@@ -48,7 +50,8 @@ def parse_world(
             else _world(text, path, context)
         )
     except UserError:
-        # The error may only be a consequence of a missing file, such as a pose relative to a model in it.
+        # The error may only be a consequence of a missing file, such as a pose relative to a model
+        # in it.
         context.complain_of_missing()
         raise
     except RecursionError:
@@ -63,7 +66,9 @@ def read_model(path: Path, reading: Reading = PLAIN) -> Model:
 def parse_model(
     text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None
 ) -> Model:
-    """The one model in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
+    """The one model in `text`, the content of `path`; other files come from `resources`, by default
+    from disk. Raises UserError.
+    """
     context = Context(resources=resources or disk_of(path, reading), reading=reading)
     scope = Scope(root_of(text, path, context), (path,), context)
     if len(scope.parts) != 1:
@@ -77,7 +82,9 @@ def parse_model(
 
 
 def disk_of(path: Path, reading: Reading) -> Resources:
-    """The files beside the world `path`, and those in the folders of `reading.model_path`. Raises UserError."""
+    """The files beside the world `path`, and those in the folders of `reading.model_path`. Raises
+    UserError.
+    """
     for folder in reading.model_path:
         if not folder.is_dir():
             raise UserError(f"reading.model_path: there is no folder {folder}")
@@ -133,7 +140,9 @@ def _world(text: bytes, path: Path, context: Context) -> World:
 
 
 def _opened(world: World, root: Element, scope: Scope, context: Context) -> World:
-    """`world` with the parts of its models as models; models from other files are first copied into its text."""
+    """`world` with the parts of its models as models; models from other files are first copied into
+    its text.
+    """
     part_at = {part.at.start: part for part in scope.parts}
     parts = {
         model.name: part_at[model.spans[0][0]]

@@ -1,4 +1,6 @@
-"""Stand-ins: simple shapes that replace missing models and meshes, as the user gives them or as a guess."""
+"""Stand-ins: simple shapes that replace missing models and meshes, as the user gives them or as a
+guess.
+"""
 
 from __future__ import annotations
 
@@ -36,14 +38,19 @@ NONE = "none"
 # In place of a URI: everything that is missing.
 ALL_MISSING = "*"
 LARGEST = 1e6  # m
-HOW = f"{', '.join(f'{kind}:{sizes}' for kind, sizes in SIZES.items())} (m), visual, collision, auto or none"
+HOW = (
+    f"{', '.join(f'{kind}:{sizes}' for kind, sizes in SIZES.items())} (m), visual, collision, "
+    "auto or none"
+)
 
 
 @dataclass(frozen=True)
 class Placed:
-    """A shape and where it is in the frame of its `<collision>` or `<visual>`, or of what it stands in for.
+    """A shape and where it is in the frame of its `<collision>` or `<visual>`, or of what it stands
+    in for.
 
-    `pieces` are the convex shapes that collide in place of `shape` if that is a mesh that is not convex; none for any other.
+    `pieces` are the convex shapes that collide in place of `shape` if that is a mesh that is not
+    convex; none for any other.
     """
 
     shape: Shape
@@ -51,8 +58,8 @@ class Placed:
     pieces: tuple[tuple[Shape, Pose], ...] = ()
 
 
-# A shape, or a word: `visual` and `collision` are the box around these shapes of the link, `none` leaves it out, and `auto` guesses
-# a shape for what is missing, but leaves what is there.
+# A shape, or a word: `visual` and `collision` are the box around these shapes of the link, `none`
+# leaves it out, and `auto` guesses a shape for what is missing, but leaves what is there.
 StandIn = Placed | str
 
 
@@ -84,9 +91,11 @@ def parse_option(option: str) -> tuple[str, str]:
 
 
 def parse_stand_in(text: str, where: str) -> StandIn:
-    """The stand-in written as `kind:sizes` or `kind:sizes@x,y,z`. Raises UserError beginning with `where`.
+    """The stand-in written as `kind:sizes` or `kind:sizes@x,y,z`. Raises UserError beginning with
+    `where`.
 
-    It stands on the origin of the frame that it replaces, as most meshes of props do; `@x,y,z` sets its centre instead.
+    It stands on the origin of the frame that it replaces, as most meshes of props do; `@x,y,z` sets
+    its centre instead.
     """
     if text in (*SIBLINGS, AUTO, NONE):
         return text
@@ -136,10 +145,11 @@ NO_FLOOR = "is left out: a floor of unknown size is not guessed"
 
 
 def guess(uri: str, link: Element | None = None) -> tuple[Placed, str, str, Vector | None] | None:
-    """The shape for a missing model, or for a missing mesh of the `link`: the stand-in, its text, and why it is this one.
+    """The shape for a missing model, or for a missing mesh of the `link`: the stand-in, its text,
+    and why it is this one.
 
-    It stands where the mesh would, and has the size of a mesh of that scale; without a scale, at the link's centre of mass.
-    None for a floor of which nothing says how large it is.
+    It stands where the mesh would, and has the size of a mesh of that scale; without a scale, at
+    the link's centre of mass. None for a floor of which nothing says how large it is.
     """
     model = model_named(uri)
     if known := KNOWN_SIZES.get(model):
@@ -178,8 +188,9 @@ def _box_of_inertia(link: Element) -> str | None:
     return f"box:{sides}@0,0,0"
 
 
-# From the collisions and meshes in github.com/osrf/gazebo_models: the box around the model, or the cylinder. Of the barrel
-# without its flat foot, which has a radius of 0.51 m. Only models whose mesh has the frame of the model.
+# From the collisions and meshes in github.com/osrf/gazebo_models: the box around the model, or the
+# cylinder. Of the barrel without its flat foot, which has a radius of 0.51 m. Only models whose
+# mesh has the frame of the model.
 KNOWN_SIZES = {
     "asphalt_plane": "box:20,20,0.1@0,0,0",
     "beer": "cylinder:0.055,0.23@0,0,0",

@@ -1,4 +1,6 @@
-"""Converts a URDF robot to SDF elements: links with mass, shapes, colours and Gazebo's friction, and joints."""
+"""Converts a URDF robot to SDF elements: links with mass, shapes, colours and Gazebo's friction,
+and joints.
+"""
 
 from __future__ import annotations
 
@@ -76,7 +78,9 @@ def is_urdf(element: Element) -> bool:
 
 
 def without_mass(model: Model, element: Element) -> Model:
-    """`model` with the links that have no mass in its URDF robot as mere frames, since the SDF reader gives every link a mass."""
+    """`model` with the links that have no mass in its URDF robot as mere frames, since the SDF
+    reader gives every link a mass.
+    """
     robot = element.parent
     if robot is None or robot.tag != ROOT:
         return model
@@ -141,7 +145,9 @@ def _geometry(part: Element, context: Context) -> Element:
 
 
 def _surface(link: str, part: Element, robot: Element) -> list[Element]:
-    """What says how slippery a collision is: a `<surface>` from `<gazebo reference="link">`, and Drake's own properties."""
+    """What says how slippery a collision is: a `<surface>` from `<gazebo reference="link">`, and
+    Drake's own properties.
+    """
     coefficients = [
         element(ours, found, text_of(found) or given(found, "value"))
         for extension in robot.findall("gazebo")
@@ -156,13 +162,17 @@ def _surface(link: str, part: Element, robot: Element) -> list[Element]:
 
 
 def _drake_properties(own: Element) -> Element:
-    """Drake's own properties of a collision, whose values are attributes in URDF and text in SDF."""
+    """Drake's own properties of a collision, whose values are attributes in URDF and text in
+    SDF.
+    """
     values = [element(each.tag, each, given(each, "value")) for each in own if each.get("value")]
     return element(own.tag, own, "", *values)
 
 
 def _material(part: Element, robot: Element) -> list[Element]:
-    """The `<material>` of a visual: its own colour, or that of the robot's material of the same name."""
+    """The `<material>` of a visual: its own colour, or that of the robot's material of the same
+    name.
+    """
     own = part.findall("material")[:1]
     named = [
         other
@@ -216,7 +226,9 @@ def joint_of(source: Element, parent: str, child: str) -> Element:
 def element(
     tag: str, source: Element, text: str = "", *children: Element, **attributes: str
 ) -> Element:
-    """An SDF element with `text` and `children`, at the position of `source` in the file and with it as parent."""
+    """An SDF element with `text` and `children`, at the position of `source` in the file and with
+    it as parent.
+    """
     made = Element(tag, attributes)
     made.text = text
     made.extend(children)

@@ -1,7 +1,8 @@
-"""The world that Drake's model directives make: each model at the place where Drake puts it, and what is welded to what.
+"""The world that Drake's model directives make: each model at the place where Drake puts it, and
+what is welded to what.
 
-A model that is welded to the world, or to what does not move, is a model of its own, tied to what carries it. A model that is
-welded to one that can move is one body with that, and so a part of it.
+A model that is welded to the world, or to what does not move, is a model of its own, tied to what
+carries it. A model that is welded to one that can move is one body with that, and so a part of it.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ Group = tuple[str, str]  # a model and the root of those of its links that joint
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame that is fixed to `link` of `model`, at `pose` where the model's own file puts that; the world if both are empty.
+    """A frame that is fixed to `link` of `model`, at `pose` where the model's own file puts that;
+    the world if both are empty.
 
     Without any of the `owners` there is no such frame.
     """
@@ -56,7 +58,9 @@ class Frame:
 
 @dataclass(frozen=True, kw_only=True)
 class Fixing:
-    """What places a group of links: its frame `own` stands at `pose` in the frame `base`, by a weld or as a free body."""
+    """What places a group of links: its frame `own` stands at `pose` in the frame `base`, by a weld
+    or as a free body.
+    """
 
     own: Frame
     base: Frame
@@ -249,7 +253,9 @@ class _Builder:
     # Where all of it is.
 
     def _place(self, group: Group) -> Pose:
-        """How far a group of links moves from the place where its own file puts it. Raises UserError."""
+        """How far a group of links moves from the place where its own file puts it. Raises
+        UserError.
+        """
         fixing = self.fixings.get(group)
         if fixing is None:
             return HERE
@@ -327,7 +333,9 @@ class _Builder:
         return model
 
     def all(self) -> tuple[Model, ...]:
-        """The models in the order of their directives, each with those that are parts of it. Raises UserError."""
+        """The models in the order of their directives, each with those that are parts of it. Raises
+        UserError.
+        """
         made = {name: self.finish(name) for name in self.models}
         for name, (outer, weld) in self.carriers.items():
             part = made.pop(name)
@@ -360,7 +368,9 @@ class _Builder:
         return self.carriers[name][0] if name in self.carriers else name
 
     def shared(self) -> Iterator[Shared]:
-        """What of collision filter groups goes when all of some models are gone. Raises UserError."""
+        """What of collision filter groups goes when all of some models are gone. Raises
+        UserError.
+        """
         groups: dict[str, Directive] = {}
         for one in self.filters:
             name = one.source.name_of(one.keys["name"])
@@ -411,9 +421,11 @@ class _Builder:
 
 
 def parse_directives(text: bytes, path: Path, context: Context) -> World:
-    """The world that the directives in `text`, the content of `path`, make. Raises UserError with file and line.
+    """The world that the directives in `text`, the content of `path`, make. Raises UserError with
+    file and line.
 
-    Its text is that of the file; if that opens others, with their directives in place of `add_directives`.
+    Its text is that of the file; if that opens others, with their directives in place of
+    `add_directives`.
     """
     found, flat = opened(text, path, context)
     builder = _Builder(context=context)
@@ -465,7 +477,9 @@ def _element(tag: str, path: Path, line: int = 1, span: Span = (0, 0)) -> Elemen
 
 
 def _frames(scope: Scope, here: Pose, prefix: str) -> Iterator[tuple[str, Pose, str]]:
-    """The links and frames of a model and of those inside it: name, pose where the file puts it, and link."""
+    """The links and frames of a model and of those inside it: name, pose where the file puts it,
+    and link.
+    """
     named = [
         name
         for name, one in scope.named.items()
@@ -482,7 +496,9 @@ def _frames(scope: Scope, here: Pose, prefix: str) -> Iterator[tuple[str, Pose, 
 def _at_positions(
     model: Model, positions: Mapping[str, Node], source: Source
 ) -> tuple[Model, dict[str, Pose]]:
-    """`model` with joints at `positions` (rad, or m), and how far each link moves. Raises UserError."""
+    """`model` with joints at `positions` (rad, or m), and how far each link moves. Raises
+    UserError.
+    """
     joints = {joint.name: joint for joint in model.joints}
     at: dict[str, float] = {}
     turns: dict[str, Pose] = {}
@@ -543,7 +559,9 @@ def _moved_joint(joint: Joint, by: Pose, position: float = 0.0) -> Joint:
 
 
 def _hung_from(link: str, joints: list[Joint]) -> list[Joint]:
-    """The joints of a model that hangs from `link`: those between that and the root turn the other way round."""
+    """The joints of a model that hangs from `link`: those between that and the root turn the other
+    way round.
+    """
     holding = {joint.child: joint for joint in joints if joint.parent != WORLD}
     turned = {}
     while link in holding:

@@ -1,4 +1,6 @@
-"""XML elements that know their file, line and byte range, so that every error message can point at its cause."""
+"""XML elements that know their file, line and byte range, so that every error message can point at
+its cause.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ _TAG_END = re.compile(rb"""(?:[^'">]|"[^"]*"|'[^']*')*>""")
 
 
 def parse(text: bytes, path: Path, root: str = "") -> Element:
-    """The element called `root` of `text`, or else its first one. Raises UserError with file, line and column."""
+    """The element called `root` of `text`, or else its first one. Raises UserError with file, line
+    and column.
+    """
     if not text.strip():
         raise UserError(f"{path}: the file is empty; expected an SDF file")
     try:
@@ -58,7 +62,9 @@ def edited(text: bytes, edits: Sequence[Edit]) -> bytes:
 
 
 def place(element: Element) -> str:
-    """File, line and XPath of `element`, such as /sdf/world/model[@name='box']/link[@name='link']/pose."""
+    """File, line and XPath of `element`, such as
+    /sdf/world/model[@name='box']/link[@name='link']/pose.
+    """
     steps = []
     node: Element | None = element
     while node is not None:
@@ -89,7 +95,9 @@ def name_of(element: Element) -> str:
 
 
 def floats(element: Element) -> tuple[float, ...]:
-    """All numbers in the text of `element`, infinite ones and NaN included; empty if any word is not a number."""
+    """All numbers in the text of `element`, infinite ones and NaN included; empty if any word is
+    not a number.
+    """
     text = element.text or ""
     # Python would also accept 1_000 and the digits of other scripts.
     if "_" in text or not text.isascii():
@@ -111,20 +119,26 @@ def numbers(element: Element, count: int) -> tuple[float, ...]:
 
 
 def number(parent: Element, tag: str, default: float) -> float:
-    """The number in child `tag` of `parent`, or `default` if there is no such child. Raises UserError."""
+    """The number in child `tag` of `parent`, or `default` if there is no such child. Raises
+    UserError.
+    """
     child = parent.find(tag)
     return default if child is None else numbers(child, 1)[0]
 
 
 def number_or_nan(parent: Element, path: str, default: float = math.nan) -> float:
-    """The number in the child `path` of `parent`, NaN if it is not one number; `default` if there is no such child."""
+    """The number in the child `path` of `parent`, NaN if it is not one number; `default` if there
+    is no such child.
+    """
     child = parent.find(path)
     values = (default,) if child is None else floats(child)
     return values[0] if len(values) == 1 else math.nan
 
 
 def truth(parent: Element, tag: str, default: bool) -> bool:
-    """The boolean (true, false, 1, 0) in child `tag` of `parent`, or `default`. Raises UserError."""
+    """The boolean (true, false, 1, 0) in child `tag` of `parent`, or `default`. Raises
+    UserError.
+    """
     child = parent.find(tag)
     if child is None:
         return default
