@@ -99,8 +99,7 @@ def _is_positional_call(node: ast.AST, dataclasses: frozenset[str]) -> bool:
     if not isinstance(node, ast.Call):
         return False
     name = ast.unparse(node.func).split(".")[-1]
-    starred = any(isinstance(argument, ast.Starred) for argument in node.args)
-    return name in dataclasses and (starred or len(node.args) > MOST_POSITIONAL)
+    return name in dataclasses and len(node.args) > MOST_POSITIONAL
 
 
 if __name__ == "__main__":

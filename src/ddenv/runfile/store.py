@@ -47,7 +47,7 @@ CREATE TABLE event (id INTEGER PRIMARY KEY AUTOINCREMENT, time REAL NOT NULL, ki
 CREATE TABLE command (id INTEGER PRIMARY KEY AUTOINCREMENT, time REAL NOT NULL, kind TEXT NOT NULL, data TEXT NOT NULL);
 CREATE TABLE motion (test INTEGER NOT NULL, model TEXT NOT NULL, samples BLOB NOT NULL, PRIMARY KEY (test, model)) WITHOUT ROWID;
 CREATE TABLE live (slot INTEGER PRIMARY KEY, test INTEGER NOT NULL, time REAL NOT NULL, pose TEXT NOT NULL);
-"""  # noqa: E501: a run file keeps this text, and is compared with it.
+"""  # noqa: E501 - what a run file has is compared with this text
 _ROWS = "SELECT id, time, kind, data FROM {} WHERE id > ? ORDER BY id LIMIT ?"
 _TABLES = {statement.strip() for statement in _SCHEMA.split(";") if statement.strip()}
 # The endings of the files that SQLite keeps beside a run file while it is open. After a kill they

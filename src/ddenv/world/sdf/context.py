@@ -47,8 +47,8 @@ QUIET: dict[str, frozenset[str]] = {
         "bounce": "restitution_coefficient threshold",
         "visual": "pose geometry material cast_shadows transparency laser_retro meta "
         "visibility_flags",
-        "joint": "pose parent child axis axis2 physics thread_pitch screw_thread_pitch gearbox_ratio "
-        "gearbox_reference_body",
+        "joint": "pose parent child axis axis2 physics thread_pitch screw_thread_pitch "
+        "gearbox_ratio gearbox_reference_body",
         "axis": "xyz limit dynamics use_parent_model_frame initial_position",
         "limit": "lower upper effort velocity stiffness dissipation",
         "dynamics": "damping friction spring_reference spring_stiffness",
