@@ -150,7 +150,9 @@ def nearest(word: str, known: Iterable[str]) -> str:
     """ " (did you mean ...?)" with the known word nearest to `word`, or ""."""
     words = [each[:LONGEST_COMPARED] for each in islice(known, MOST_COMPARED)]
     match = difflib.get_close_matches(word[:LONGEST_COMPARED], words, n=1, cutoff=0.5)
-    return f" (did you mean {match[0]}?)" if match else ""
+    if match:
+        return f" (did you mean {match[0]}?)"
+    return ""
 
 
 @cache

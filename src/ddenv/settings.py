@@ -67,7 +67,9 @@ class Setting:
     @property
     def key(self) -> str:
         """Its place in a scenario, such as `reduction.iterations`; "" if it has none."""
-        return f"{self.section}.{self.name}" if self.section else ""
+        if self.section:
+            return f"{self.section}.{self.name}"
+        return ""
 
     @property
     def label(self) -> str:
@@ -77,12 +79,16 @@ class Setting:
     @property
     def option(self) -> str:
         """Its option on the command line, "" where it has none."""
-        return "" if self.shown == "scenario" else f"--{self.name.replace('_', '-')}"
+        if self.shown == "scenario":
+            return ""
+        return f"--{self.name.replace('_', '-')}"
 
     @property
     def summary(self) -> str:
         """The meaning with its unit."""
-        return f"{self.meaning}, {self.unit}" if self.unit else self.meaning
+        if self.unit:
+            return f"{self.meaning}, {self.unit}"
+        return self.meaning
 
     @property
     def range(self) -> str:
@@ -91,17 +97,17 @@ class Setting:
             return f"more than {self.above:g}, at most {self.most:g}"
         if self.least is None:
             return ""
-        return (
-            f"{self.least:g} or more"
-            if self.most is None
-            else f"{number_text(self.least)} to {number_text(self.most)}"
-        )
+        if self.most is None:
+            return f"{self.least:g} or more"
+        return f"{number_text(self.least)} to {number_text(self.most)}"
 
     @property
     def wanted(self) -> str:
         """What kind of number it is, and the allowed ones, in words."""
         kind = "a whole number" if self.kind is int else "a number"
-        return f"{kind} from {self.range}" if " to " in self.range else f"{kind}, {self.range}"
+        if " to " in self.range:
+            return f"{kind} from {self.range}"
+        return f"{kind}, {self.range}"
 
     def words(self, value: Value) -> list[str]:
         """The option with `value`, as typed on the command line."""
@@ -128,11 +134,9 @@ class Setting:
 
 def number_text(value: Value) -> str:
     """A value as short as it can be typed."""
-    return (
-        str(int(value))
-        if isinstance(value, float) and value.is_integer() and abs(value) < 1e9
-        else str(value)
-    )
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e9:
+        return str(int(value))
+    return str(value)
 
 
 def setting(default: Value, meaning: str, **more: Any) -> Any:
@@ -478,7 +482,9 @@ def read(scenario: Mapping[str, Any], one: Setting) -> Value:
     value = section.get(one.name, one.default) if one.stored else is_printed(section)
     if not one.allows(value):
         return one.default
-    return plain(value) if isinstance(value, str) else value
+    if isinstance(value, str):
+        return plain(value)
+    return value
 
 
 def put(scenario: Mapping[str, Data], one: Setting, value: Value) -> None:

@@ -42,7 +42,9 @@ def width(text: str) -> int:
 def _width(char: str) -> int:
     if unicodedata.category(char) in ("Mn", "Me", "Cf"):
         return 0
-    return 2 if unicodedata.east_asian_width(char) in "WF" else 1
+    if unicodedata.east_asian_width(char) in "WF":
+        return 2
+    return 1
 
 
 def shortened(name: str, columns: int, head: int | None = None) -> str:
@@ -58,7 +60,9 @@ def shortened(name: str, columns: int, head: int | None = None) -> str:
         take_first = width(first) <= width(last) if head is None else width(first) < head
         char = name[len(first)] if take_first else name[-1 - len(last)]
         if width(first) + width(last) + _width(char) + 1 > columns:
-            return f"{first}…{last}" if columns > 0 else ""
+            if columns > 0:
+                return f"{first}…{last}"
+            return ""
         first, last = (first + char, last) if take_first else (first, char + last)
 
 
@@ -76,7 +80,9 @@ def told_apart(names: tuple[str, ...], columns: int) -> dict[str, str]:
 
 def truncated(line: str, columns: int) -> str:
     """A maximum of `columns` characters of a line, with an ellipsis at its end if it is longer."""
-    return line if len(line) <= columns else f"{line[: max(0, columns - 1)]}…"
+    if len(line) <= columns:
+        return line
+    return f"{line[: max(0, columns - 1)]}…"
 
 
 def padded(text: str, columns: int) -> str:
@@ -86,7 +92,9 @@ def padded(text: str, columns: int) -> str:
 
 def count(number: int, word: str) -> str:
     """1 model, 2 models."""
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+    if number == 1:
+        return f"{number} {word}"
+    return f"{number} {word}s"
 
 
 def as_sentence(words: str) -> str:
@@ -120,7 +128,9 @@ def rounded(number: float) -> int:
     1 at least.
     """
     if not 10 <= number < math.inf:
-        return max(1, round(number)) if math.isfinite(number) else 1
+        if math.isfinite(number):
+            return max(1, round(number))
+        return 1
     digits: int = 10 ** math.floor(math.log10(number))
     step = digits // 2 if number < 5 * digits else digits
     return step * round(number / step)
@@ -128,17 +138,18 @@ def rounded(number: float) -> int:
 
 def between(low: float, high: float) -> str:
     """An estimate's range as it is said: "50 to 1,000", or "20" where it is known."""
-    return f"{rounded(low):,} to {rounded(high):,}" if low < high else f"{rounded(high):,}"
+    if low < high:
+        return f"{rounded(low):,} to {rounded(high):,}"
+    return f"{rounded(high):,}"
 
 
 def about(middle: float, low: float = 0.0, high: float = 0.0) -> str:
     """An estimated time in s, with its interval if there is one: 2 min (1 to 5)."""
     unit, name = (1.0, "s") if middle < 90 else (60.0, "min") if middle < 5400 else (3600.0, "h")
-    interval = (
-        f" ({between(low / unit, high / unit)})"
-        if rounded(low / unit) < rounded(high / unit)
-        else ""
-    )
+    if rounded(low / unit) < rounded(high / unit):
+        interval = f" ({between(low / unit, high / unit)})"
+    else:
+        interval = ""
     return f"{rounded(middle / unit):,} {name}{interval}"
 
 

@@ -123,7 +123,9 @@ def isolate_command(
         print(json.dumps({"nearest": asdict(found)}))
     else:
         say(found.sentences)
-    return 0 if found.gone else 1
+    if found.gone:
+        return 0
+    return 1
 
 
 @click.command("margins")

@@ -157,6 +157,8 @@ def _open(name: str | None) -> int:
         from ddenv.workbench.learn.lesson_screen import LessonScreen
         from ddenv.workbench.learn.lessons_screen import LessonsScreen
 
-        return LessonsScreen(lesson) if path is None else LessonScreen(path)
+        if path is None:
+            return LessonsScreen(lesson)
+        return LessonScreen(path)
 
     return run_workbench(first=screen)

@@ -36,13 +36,12 @@ def runs_command() -> int:
         print(f"no runs yet in {runs_folder()}; 'ddenv run ditch' makes one")
     width = max((len(run.path.stem) for run in found), default=0)
     for run in found:
-        status = (
-            "minimal"
-            if run.minimal
-            else "engine not running"
-            if run.status == "lost"
-            else run.status
-        )
+        if run.minimal:
+            status = "minimal"
+        elif run.status == "lost":
+            status = "engine not running"
+        else:
+            status = run.status
         size = f"{len(run.kept)} of {run.total} models"
         says = run.trouble or f"{status:<18}  {size:<20}  {run.tests} tests"
         print(printable(f"{run.path.stem:<{width}}  {says}"))
@@ -155,7 +154,9 @@ def doctor_command(run: str | None, repair: Path | None, as_json: bool) -> int:
         )
     else:
         print("\n".join(map(printable, finding_lines(found, terminal_columns()))))
-    return 0 if is_well(found) else 1
+    if is_well(found):
+        return 0
+    return 1
 
 
 def finding_lines(found: Iterable[Finding], columns: int | None) -> Iterator[str]:

@@ -66,7 +66,9 @@ def summary(state: RunState, path: Path) -> Data:
 
 def _rate(node: Node | None) -> Data | None:
     """How often f showed in an environment, from all runs of it that did not break."""
-    return None if node is None or not node.runs else _share(node.shown, len(node.runs))
+    if node is None or not node.runs:
+        return None
+    return _share(node.shown, len(node.runs))
 
 
 def _share(shown: int, runs: int) -> Data:
@@ -174,11 +176,10 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
         out = f", and H in it leaves {could_go[0]} out" if could_go else ""
         run = attach_name(path)
         bundle = shlex.quote(f"{path.stem}.zip")
-        passing = (
-            ""
-            if state.isolated is not None
-            else f"'ddenv isolate {run}' finds a nearest world that passes, "
-        )
+        if state.isolated is not None:
+            passing = ""
+        else:
+            passing = f"'ddenv isolate {run}' finds a nearest world that passes, "
         said.append(
             f"next: 'ddenv open {run}' shows it{out}, 'ddenv why {run}' says why it fails, "
             f"{passing}"
@@ -209,4 +210,6 @@ def _certificate_lines(state: RunState) -> list[str]:
         lines.append(f"  and {count(more, 'more model')}")
     if (whole := _whole_world(state)) is not None:
         lines.append(f"  the whole world: {rate(whole)}")
-    return [*lines, promise(state, found)] if state.certified else lines
+    if state.certified:
+        return [*lines, promise(state, found)]
+    return lines

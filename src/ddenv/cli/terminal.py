@@ -19,7 +19,9 @@ LEAST = 8
 
 def terminal_columns(stream: TextIO | None = None) -> int | None:
     """How wide the terminal is, columns; None where `stream`, by default stdout, goes elsewhere."""
-    return shutil.get_terminal_size().columns if (stream or sys.stdout).isatty() else None
+    if (stream or sys.stdout).isatty():
+        return shutil.get_terminal_size().columns
+    return None
 
 
 def wrapped(text: str, columns: int | None, first: str = "") -> list[str]:

@@ -139,9 +139,10 @@ def _subject(
     another = None if simulator is None else load_simulator(simulator)
     found = open_subject(name, given, announce)
     # Another simulator may start the scenario's own controller.
-    starts = (
-        found.scenario if another is None else found.scenario.model_copy(update={"oracle": None})
-    )
+    if another is None:
+        starts = found.scenario
+    else:
+        starts = found.scenario.model_copy(update={"oracle": None})
     if found.run is None:
         check_named(starts, name, asking(trust))
     else:
@@ -163,7 +164,9 @@ def line(result: Mapping[str, Any]) -> str:
         how += "" if result["distance"] is None else f"  {result['distance']:.2f} m from f"
     without = f"  without {result['without']}" if result["without"] else ""
     said = printable(f"seed {result['seed']:<10} {result['outcome']:<8} {how}{without}")
-    return f"{said}\n  {printable(result['recorded'])}" if "recorded" in result else said
+    if "recorded" in result:
+        return f"{said}\n  {printable(result['recorded'])}"
+    return said
 
 
 def summary(results: Sequence[Mapping[str, Any]]) -> list[Data]:
@@ -204,11 +207,10 @@ def lines(rows: Sequence[Mapping[str, Any]], said: Mapping[str | None, str] = {}
     for row in rows:
         words = said.get(row["without"], "")
         if not words:
-            words = (
-                f"without {row['without']}"
-                if row["without"]
-                else f"all {count(row['models'], 'model')}"
-            )
+            if row["without"]:
+                words = f"without {row['without']}"
+            else:
+                words = f"all {count(row['models'], 'model')}"
             share = f"{row['shown']} of {count(row['runs'], 'run')}"
             shown = f"{f'f in {share}' if known else f'{share} failed'}"
             words += (
@@ -276,6 +278,8 @@ def _needed_there(results: Sequence[Mapping[str, Any]], without: str) -> str:
     seeds = [seed for model, seed in shown if model is None and (without, seed) in shown]
 
     def shown_in(environment: Environment, run: int) -> Shown:
-        return shown[models[environment], seeds[run]] if run < len(seeds) else None
+        if run < len(seeds):
+            return shown[models[environment], seeds[run]]
+        return None
 
     return settle(falls(rest, left, ERROR), shown_in).verdict

@@ -170,7 +170,11 @@ def _notes(world: World, *models: str) -> list[dict[str, str]]:
 def _kind(model: Model) -> str:
     from ddenv.world.model import is_ground
 
-    return "ground" if is_ground(model) else "static" if model.static else "dynamic"
+    if is_ground(model):
+        return "ground"
+    if model.static:
+        return "static"
+    return "dynamic"
 
 
 def _shapes(model: Model) -> Counter[str]:

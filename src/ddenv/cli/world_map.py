@@ -182,4 +182,6 @@ def _escaped(run: Run) -> str:
         if color != PLAIN
     ]
     codes += ["1"] if run.bold else []
-    return f"\x1b[{';'.join(codes)}m{run.text}\x1b[0m" if codes else run.text
+    if codes:
+        return f"\x1b[{';'.join(codes)}m{run.text}\x1b[0m"
+    return run.text

@@ -79,9 +79,10 @@ def terminal() -> Iterator[Finding]:
     else:
         columns, lines = shutil.get_terminal_size()
         small = columns < SMALLEST[0] or lines < SMALLEST[1]
-        advice = (
-            f"the workbench is designed for {SMALLEST[0]} by {SMALLEST[1]} or more" if small else ""
-        )
+        if small:
+            advice = f"the workbench is designed for {SMALLEST[0]} by {SMALLEST[1]} or more"
+        else:
+            advice = ""
         yield Finding(
             group="terminal",
             what="size",

@@ -125,7 +125,9 @@ def _log(path: Path, alive: bool) -> Finding:
 def _log_of(path: Path) -> Path | None:
     """SQLite's log beside a run; None if there is none, or nothing in it."""
     log = path.with_name(f"{path.name}-wal")
-    return log if log.exists() and log.stat().st_size else None
+    if log.exists() and log.stat().st_size:
+        return log
+    return None
 
 
 def _content(file: RunFile, path: Path, alive: bool) -> Iterator[Finding]:
@@ -192,4 +194,6 @@ def _repair(path: Path) -> str:
 def _without(words: str) -> str:
     """What is wrong, without the name of the file: it may be that of a copy."""
     head, separator, rest = words.partition(": ")
-    return rest if separator and "/" in head else words
+    if separator and "/" in head:
+        return rest
+    return words

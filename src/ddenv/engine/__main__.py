@@ -84,7 +84,9 @@ def main() -> int:
         signal.signal(number, lambda *_: terminated.set())
     try:
         with RunFile(options.run) as file, engine_lock(options.run):
-            return _give_up(file) if options.give_up == "yes" else _work(file, options, terminated)
+            if options.give_up == "yes":
+                return _give_up(file)
+            return _work(file, options, terminated)
     except UserError as error:
         _say(str(error))
         return 2
@@ -134,11 +136,10 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
             elif options.isolate is not None or journal.state.isolating is not None:
                 isolate(world, journal, bench, options.isolate or None, before)
             elif options.margins is not None or journal.state.margining is not None:
-                asked = (
-                    None
-                    if options.margins is None
-                    else (json.loads(options.margins), options.most_runs)
-                )
+                if options.margins is None:
+                    asked = None
+                else:
+                    asked = (json.loads(options.margins), options.most_runs)
                 find_margins(
                     (scenario, world, robot), journal, pool, control, asked, (stood, before)
                 )

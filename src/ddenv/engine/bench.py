@@ -192,11 +192,10 @@ class Bench:
             return
         result = self.made_again(test)
         if result is not None and not mixed:
-            how = (
-                f"broke ({result.failure})"
-                if isinstance(result, Broken)
-                else "gives a different trajectory"
-            )
+            if isinstance(result, Broken):
+                how = f"broke ({result.failure})"
+            else:
+                how = "gives a different trajectory"
             raise UserError(
                 f"{run}: repeated, the first run of the whole world {how}: the tests were made "
                 f"with {state.physics.proven}, and "
@@ -230,7 +229,9 @@ class Bench:
         same = isinstance(result, RunResult) and np.array_equal(
             result.trajectory, rows_of(journal.file, test.id)
         )
-        return None if same else result
+        if same:
+            return None
+        return result
 
     def finish_trials(self) -> None:
         """Obeys the last commands, and makes the tests that the user asked for. Raises as
@@ -243,7 +244,9 @@ class Bench:
     def _open_trials(self) -> list[Trial]:
         """The tries without a verdict, oldest first; they are made once f is known."""
         state = self._journal.state
-        return [trial for trial in state.trials if not trial.verdict] if state.failures else []
+        if state.failures:
+            return [trial for trial in state.trials if not trial.verdict]
+        return []
 
     def _serve_trials(self) -> None:
         """Judges tries, and starts their tests, also while the rounds are paused. Raises Stopped if

@@ -67,11 +67,10 @@ class DiskSpace:
             return False
         room = replace(self._room(), enough=False)
         if self._enough:
-            until = (
-                "the limit of a file's size (ulimit -f) is raised"
-                if room.in_file
-                else f"{NEEDED / 1e6:.0f} MB are free"
-            )
+            if room.in_file:
+                until = "the limit of a file's size (ulimit -f) is raised"
+            else:
+                until = f"{NEEDED / 1e6:.0f} MB are free"
             # The log may be on the same disk.
             with suppress(OSError):
                 print(f"{full}; waits until {until}", file=sys.stderr, flush=True)

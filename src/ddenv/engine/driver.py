@@ -239,11 +239,10 @@ class Driver:
             self._check_repeats()
             before = journal.state
             first = 1 if before.round is None else before.round.number + 1
-            rate = (
-                journal.rate_of_whole()
-                if before.scenario["reduction"]["accept_rate"] == "kept"
-                else 0.0
-            )
+            if before.scenario["reduction"]["accept_rate"] == "kept":
+                rate = journal.rate_of_whole()
+            else:
+                rate = 0.0
             journal.record(
                 events.LegStarted(
                     round=first, n_partitions=before.nodes[before.node].n_partitions, rate=rate
@@ -330,7 +329,9 @@ class Driver:
 
     @property
     def workers(self) -> int:
-        return max(1, self._journal.state.jobs) if self._control.speculates() else 1
+        if self._control.speculates():
+            return max(1, self._journal.state.jobs)
+        return 1
 
     def goes_on(self) -> bool:
         # Whoever accepts each reduction by hand also goes back by hand.
@@ -571,11 +572,10 @@ class Driver:
             asked = self._reduction
             number = len(journal.state.certificates) + 1
             # What the bets have won so far holds for any share, so that the same ones can go on.
-            before = (
-                last
-                if last is not None and self._certify_rate is not None and not last.seeds
-                else None
-            )
+            if last is not None and self._certify_rate is not None and not last.seeds:
+                before = last
+            else:
+                before = None
             # Where chosen runs were reduced, a rate is shown if the user asks for one.
             exact = () if self._certify_rate else self._leg.rule.exact
             shown = [run for run in exact if journal.shown(journal.environment, run)]
@@ -583,11 +583,10 @@ class Driver:
                 journal.state.test(test).seed for test in journal.tests(journal.environment, shown)
             )
             beside = RUNS_BESIDE_ALIKE if stands_for_all(journal.state) else RUNS_BESIDE
-            at_least = (
-                max(self._only_certify or 0, beside)
-                if seeds
-                else self._only_certify or asked.baseline_runs
-            )
+            if seeds:
+                at_least = max(self._only_certify or 0, beside)
+            else:
+                at_least = self._only_certify or asked.baseline_runs
             first, error = (
                 (before.first_run, before.error)
                 if before

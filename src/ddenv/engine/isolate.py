@@ -162,7 +162,11 @@ class _Isolator:
     def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
         """Whether a finished run reached the goal; None if it is not made yet."""
         test = self._journal.test(environment, run, full=True)
-        return None if test is None else "broken" if test.broke else test.outcome == "pass"
+        if test is None:
+            return None
+        if test.broke:
+            return "broken"
+        return test.outcome == "pass"
 
     def refused(self, environment: Environment) -> bool:
         return False

@@ -178,7 +178,9 @@ class Journal:
         """
         number = self._numbers.get(environment)
         test = None if number is None else self._tests.get((number, run, full))
-        return None if test is None else self.state.test(test)
+        if test is None:
+            return None
+        return self.state.test(test)
 
     def tests(self, environment: Environment, runs: Iterable[int], full: bool = False) -> Numbers:
         """The numbers of the finished tests among these runs."""
@@ -202,7 +204,11 @@ class Journal:
     def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
         """Whether a run showed f; None if it is not made yet."""
         test = self.test(environment, run, full)
-        return None if test is None else "broken" if test.broke else test.shows_f
+        if test is None:
+            return None
+        if test.broke:
+            return "broken"
+        return test.shows_f
 
     def evidence_of(self, tests: Iterable[int]) -> int:
         """The first of `tests` that showed f."""

@@ -312,18 +312,16 @@ class Sight:
         run = state.test(test)
         # If several failures count as f, the one that the run showed.
         ends = [end_of(state.test(test)) for test in state.failures]
-        end = (
-            ends[0]
-            if run.end_pose is None
-            else min(ends, key=lambda end: math.dist(end, end_of(run)))
-        )
+        if run.end_pose is None:
+            end = ends[0]
+        else:
+            end = min(ends, key=lambda end: math.dist(end, end_of(run)))
         # Whether a model that affected no run was sensed depends on which of two equal runs was
         # simulated.
-        seen = (
-            set(state.elements)
-            if run.took_part is None
-            else set(run.took_part.names(state.elements))
-        )
+        if run.took_part is None:
+            seen = set(state.elements)
+        else:
+            seen = set(run.took_part.names(state.elements))
         return replace(
             self._known,
             trajectory=trajectory_of(rows_of(journal.file, test)),

@@ -54,7 +54,9 @@ def wall_limit(state: RunState) -> float:
     if isinstance(asked, int | float):
         return float(asked)
     measured = state.baseline.wall_limit if state.baseline is not None else None
-    return GENEROUS if measured is None else measured
+    if measured is None:
+        return GENEROUS
+    return measured
 
 
 def limit_after(state: RunState, timeout: float) -> float:
@@ -72,7 +74,9 @@ def memory_limit(scenario: Scenario, jobs: int) -> float:
     known of the machine.
     """
     asked = scenario.simulation.memory_limit
-    return asked * GIGABYTE if asked is not None else SHARE * processor.usable_memory() / jobs
+    if asked is not None:
+        return asked * GIGABYTE
+    return SHARE * processor.usable_memory() / jobs
 
 
 def check_crash_loop(journal: Journal) -> None:

@@ -61,7 +61,9 @@ def refusal(state: RunState, where: object) -> str:
             "f shows too rarely in what is left to say where it disappears; reduce a failure "
             "that shows more often (--failure)"
         )
-    return "" if state.environment else "nothing is left, so there is no model with a margin"
+    if state.environment:
+        return ""
+    return "nothing is left, so there is no model with a margin"
 
 
 def find_margins(
@@ -243,11 +245,10 @@ class _Search:
         seed = seed_of(self._parts[0].reduction, run)
         limit = wall_limit(self._journal.state)
         # Fresh runs are full ones, as those of a certificate.
-        ends = (
-            None
-            if run >= known.FIRST_FIX_RUN or not self._journal.stops_early
-            else ends_of(self._failures)
-        )
+        if run >= known.FIRST_FIX_RUN or not self._journal.stops_early:
+            ends = None
+        else:
+            ends = ends_of(self._failures)
         test = Run(
             keep=self._kept, seed=seed, ends=ends, limit=limit, changes=self._changes(name, value)
         )

@@ -93,10 +93,9 @@ def plan(
             )
     models = tuple(name for name in models if name not in (leave_out or []))
     reduction = subject.scenario.reduction
-    runs = range(first_run, first_run + repeat)
-    seeds = (
-        [seed_of(reduction, run) for run in runs] if seed is None else range(seed, seed + repeat)
-    )
+    seeds = [seed_of(reduction, first_run + place) for place in range(repeat)]
+    if seed is not None:
+        seeds = [seed + place for place in range(repeat)]
     keeps: list[tuple[frozenset[str], str | None]] = [(frozenset(models), None)]
     if leave_each_out:
         keeps += [(frozenset(models) - {name}, name) for name in models]
@@ -116,7 +115,9 @@ def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> Names:
             if name not in subject.elements:
                 raise UserError(f"--keep: the world has no removable model '{name}'")
         return tuple(keep)
-    return subject.state.environment if minimal and subject.state else subject.elements
+    if minimal and subject.state:
+        return subject.state.environment
+    return subject.elements
 
 
 def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[Data]:

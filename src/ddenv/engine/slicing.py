@@ -78,11 +78,9 @@ def slice_audit(journal: Journal) -> tuple[Wanted, ...]:
         return ()
     environment = journal.environment
     run = state.test(here.evidence_test).run
-    return (
-        ()
-        if journal.test(environment, run) is not None
-        else (Wanted(environment=environment, run=run, why="audit"),)
-    )
+    if journal.test(environment, run) is not None:
+        return ()
+    return (Wanted(environment=environment, run=run, why="audit"),)
 
 
 def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Environment]]:

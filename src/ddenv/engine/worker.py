@@ -262,11 +262,10 @@ def _progress(tell: Callable[[Moment], object]) -> Progress:
 def reason_of(error: BaseException) -> str:
     """An exception in one line."""
     text = " ".join(str(error).split())
-    words = (
-        text
-        if isinstance(error, UserError)
-        else f"{type(error).__name__}{': ' if text else ''}{text}"
-    )
+    if isinstance(error, UserError):
+        words = text
+    else:
+        words = f"{type(error).__name__}{': ' if text else ''}{text}"
     return printable(words)[:REASON]
 
 

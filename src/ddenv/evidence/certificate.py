@@ -127,7 +127,9 @@ class Terms:
     @property
     def in_turn(self) -> float:
         """The share up to which claims of the rate that is kept are in turn."""
-        return self.certify_rate if self.first_rate is None else self.first_rate
+        if self.first_rate is None:
+            return self.certify_rate
+        return self.first_rate
 
     def error_of_models(self, kept: float | None) -> float:
         """The chance of error of a claim about a model where so much of the rate is shown to be
@@ -380,7 +382,9 @@ def _shows(whole: Environment, terms: Terms) -> Procedure:
     while run < max(1, terms.at_least) or (not shown and run < terms.vain < MOST_PAIRS):
         shown += (yield Wanted(((whole, run),), (whole,)))[0] is True
         run += 1
-    return ("kept", 1.0) if shown else ("not shown", None)
+    if shown:
+        return ("kept", 1.0)
+    return ("not shown", None)
 
 
 def falls(
@@ -528,9 +532,10 @@ def _removal_pairs(both: float, first: float, second: float) -> float:
     kinds = both, first, second
     needed = _until(NEEDS, kinds, (NEEDED_SHARE - 1.0, -1.0, NEEDED_SHARE))
     refuted = _until(REFUTED, kinds, (1.0 / NEEDED_SHARE - 1.0, 1.0 / NEEDED_SHARE, -1.0))
-    given_up = (
-        FEWEST_PAIRS if min(needed, refuted) > HOPE * MOST_REMOVAL_PAIRS else MOST_REMOVAL_PAIRS
-    )
+    if min(needed, refuted) > HOPE * MOST_REMOVAL_PAIRS:
+        given_up = FEWEST_PAIRS
+    else:
+        given_up = MOST_REMOVAL_PAIRS
     return min(needed, refuted, float(given_up))
 
 

@@ -134,7 +134,9 @@ def never_left_out(state: RunState, certificate: Certificate) -> int:
     gone = {
         name for claim in certificate.claims for name in stack_with(state, there, claim.without)
     }
-    return len(there) - len(gone) if is_minimal(certificate) else 0
+    if is_minimal(certificate):
+        return len(there) - len(gone)
+    return 0
 
 
 def is_nearest(one: Isolation) -> bool:
@@ -203,7 +205,9 @@ def failing_instead(state: RunState, certificate: Certificate, claim: Claim) -> 
 def in_the_making(state: RunState) -> Certificate | None:
     """The certificate that is being made, if there is one."""
     now = state.certificate
-    return now if now is not None and state.confirming and not now.claims else None
+    if now is not None and state.confirming and not now.claims:
+        return now
+    return None
 
 
 def fresh_runs_made(state: RunState, now: Certificate) -> int:
@@ -286,11 +290,9 @@ class FreshRuns:
         """
         if self.bound is None or (self.bound >= 1.0 if self.without else self.bound <= 0.0):
             return ""
-        return (
-            f"≤ {percent_at_most(self.bound)}"
-            if self.without
-            else f"≥ {percent_at_least(self.bound)}"
-        )
+        if self.without:
+            return f"≤ {percent_at_most(self.bound)}"
+        return f"≥ {percent_at_least(self.bound)}"
 
     @property
     def shows(self) -> str:
@@ -364,11 +366,10 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
             running=running,
         )
         found.append(undecided)
-    bounds = (
-        {}
-        if claims
-        else {without: claim.bound for without, claim in so_far(state, certificate).items()}
-    )
+    if claims:
+        bounds = {}
+    else:
+        bounds = {without: claim.bound for without, claim in so_far(state, certificate).items()}
     left_runs, whole_runs = (
         {test.run for test in tests.get((node, None), [])} for node in (certificate.node, first)
     )

@@ -87,7 +87,9 @@ def one_place(ends: Sequence[Place], epsilon: float) -> float | None:
     if len(ends) < FEWEST or groups_of(ends, epsilon):
         return None
     reach = min(max(math.dist(end, centre) for end in ends) for centre in ends)
-    return reach if epsilon < reach <= ONE_PLACE * epsilon else None
+    if epsilon < reach <= ONE_PLACE * epsilon:
+        return reach
+    return None
 
 
 def joining(reach: float) -> float:

@@ -85,9 +85,13 @@ class Rule:
             if shows:
                 return "f"
             if shows is False and reached is not None:
-                return "goal" if reached else "other"
+                if reached:
+                    return "goal"
+                return "other"
             if number >= MOST_RUNS:
-                return "undecided" if shows is None else "other"
+                if shows is None:
+                    return "undecided"
+                return "other"
         return ""
 
     def surely_needed(self, outcomes: Sequence[str]) -> int:
@@ -362,10 +366,11 @@ def steps(asked: NumberAsked, up: bool) -> tuple[float, ...]:
         max(asked.resolution, min(usual, asked.now) if asked.low == 0.0 < asked.now else usual),
     )
     growth = (reach / first) ** (1.0 / (STEPS - 1))
-    inner = (
-        (_at(asked, up, first * growth**step) for step in range(STEPS - 1)) if growth > 1.0 else ()
-    )
-    return (*dict.fromkeys(inner), asked.high if up else asked.low)
+    last = asked.high if up else asked.low
+    if growth <= 1.0:
+        return (last,)
+    inner = (_at(asked, up, first * growth**step) for step in range(STEPS - 1))
+    return (*dict.fromkeys(inner), last)
 
 
 def _at(asked: NumberAsked, up: bool, distance: float, digits: int = 2) -> float:
@@ -420,7 +425,9 @@ def next_value(asked: NumberAsked, up: bool, tried: Collection[Value]) -> float 
         value for value in farther if value not in by_value or by_value[value].verdict != "goal"
     )
     first = next(to_try, None)
-    return None if first in by_value else first
+    if first in by_value:
+        return None
+    return first
 
 
 def wanted(

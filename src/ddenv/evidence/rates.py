@@ -111,7 +111,9 @@ def leans_to(hits: int, misses: int, rate: float, other: float, error: float) ->
     rate = min(rate, 0.99)
     other = min(other, 0.97)
     ratio = hits * math.log(rate / other) + misses * math.log((1.0 - rate) / (1.0 - other))
-    return ratio > 0 if abs(ratio) >= math.log((1.0 - error) / error) else None
+    if abs(ratio) >= math.log((1.0 - error) / error):
+        return ratio > 0
+    return None
 
 
 def estimated_rate(shown: int, runs: int) -> float:

@@ -86,7 +86,9 @@ def fresh_chance(met: Sequence[Environment]) -> float:
     for models in met:
         more |= once & models
         once = (once | models) - more
-    return sum(not once.isdisjoint(models) for models in met) / len(met) if met else 1.0
+    if met:
+        return sum(not once.isdisjoint(models) for models in met) / len(met)
+    return 1.0
 
 
 # Who took part in the runs of a run file.
@@ -104,7 +106,9 @@ def in_whole_world(state: RunState) -> tuple[Counter[str], int]:
 
 def in_last(state: RunState) -> Environment | None:
     """The models that took part in the last similar run; None where that is unknown."""
-    return None if state.evidence is None else state.evidence.took_part
+    if state.evidence is None:
+        return None
+    return state.evidence.took_part
 
 
 def met_by(state: RunState, node: Node) -> list[Environment]:

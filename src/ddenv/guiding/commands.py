@@ -66,7 +66,9 @@ class Situation:
             return "the engine is still starting"
         if self.state.status == "finished":
             return FINISHED
-        return "no engine is running; space starts one" if self.engine == "absent" else ""
+        if self.engine == "absent":
+            return "no engine is running; space starts one"
+        return ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +102,9 @@ def label_of(state: RunState, test: Test) -> str:
     row = made_for(state, test)
     if row is None and test.round is None:
         return purpose(state, test)
-    return row.label if row is not None else f"a candidate of round {test.round}"
+    if row is not None:
+        return row.label
+    return f"a candidate of round {test.round}"
 
 
 def numbers_of(state: RunState, names: Iterable[str]) -> Numbers:
@@ -113,7 +117,9 @@ def waiting(state: RunState) -> Candidate | None:
     """The candidate whose reduction waits for accept or reject."""
     round = state.round
     waits = state.waiting_candidate
-    return None if round is None or waits is None else round.candidates[waits]
+    if round is None or waits is None:
+        return None
+    return round.candidates[waits]
 
 
 def new_search(state: RunState, size: int | None = None) -> str:
@@ -167,9 +173,10 @@ class AcceptMode(Asked):
 
     def words(self, _: RunState) -> Words:
         ask = self.mode == "ask"
-        said = (
-            "each reduction will wait for you" if ask else "reductions are accepted automatically"
-        )
+        if ask:
+            said = "each reduction will wait for you"
+        else:
+            said = "reductions are accepted automatically"
         return Words(f"accept mode {self.mode}", said)
 
 
@@ -177,7 +184,9 @@ class Stop(Asked):
     """End the engine; another one can go on from there."""
 
     def refusal(self, now: Situation) -> str:
-        return "no engine is running" if now.engine == "absent" else ""
+        if now.engine == "absent":
+            return "no engine is running"
+        return ""
 
 
 class StartEngine(Asked):
@@ -192,11 +201,9 @@ class StartEngine(Asked):
         if state.status == "finished":
             return FINISHED
         spent = state.budget is not None and state.made >= state.budget
-        return (
-            f"the budget of {count(state.budget or 0, 'test')} is used up; c raises it"
-            if spent
-            else ""
-        )
+        if spent:
+            return f"the budget of {count(state.budget or 0, 'test')} is used up; c raises it"
+        return ""
 
 
 class Isolate(Asked):
@@ -233,7 +240,9 @@ class Undo(Asked):
         here = now.state.here
         if here is None or here.parent is None:
             return "there is no reduction to take back"
-        return "the last undo is not done yet" if now.pending == "undo" else ""
+        if now.pending == "undo":
+            return "the last undo is not done yet"
+        return ""
 
     def words(self, state: RunState) -> Words:
         here = state.here
@@ -259,7 +268,9 @@ class GoBack(Asked):
             return "there is no such place in the history"
         if state.baseline is None:
             return NO_FAILURE
-        return "the run is there already" if self.node == state.node else ""
+        if self.node == state.node:
+            return "the run is there already"
+        return ""
 
     def words(self, state: RunState) -> Words:
         there = place(state.nodes[self.node])
@@ -305,7 +316,9 @@ class Change(Asked):
                 f"failure: the whole world showed {count(len(baseline.seen), 'failure')}; choose "
                 "one of these"
             )
-        return "" if new else "these are the settings already"
+        if new:
+            return ""
+        return "these are the settings already"
 
     def words(self, state: RunState) -> Words:
         new = self.new(state).items()
@@ -388,15 +401,15 @@ class OfCandidate(Asked):
             or current.number != self.round
         ):
             return None
-        return (
-            current.candidates[self.candidate]
-            if 0 <= self.candidate < len(current.candidates)
-            else None
-        )
+        if 0 <= self.candidate < len(current.candidates):
+            return current.candidates[self.candidate]
+        return None
 
     def label(self, state: RunState) -> str:
         one = self.meant(state)
-        return "the candidate" if one is None else one.label
+        if one is None:
+            return "the candidate"
+        return one.label
 
     def refusal(self, now: Situation) -> str:
         state = now.state
@@ -405,7 +418,9 @@ class OfCandidate(Asked):
         if state.round is None or waits is None or state.search_due:
             return "that reduction no longer waits"
         is_it = (self.round, self.candidate) == (state.round.number, waits.index)
-        return "" if is_it else "that reduction no longer waits"
+        if is_it:
+            return ""
+        return "that reduction no longer waits"
 
 
 class Accept(OfCandidate):
@@ -431,7 +446,9 @@ class Veto(OfCandidate):
             return round_over(now.state)
         if one.index == now.state.waiting_candidate:
             return f"{one.label} showed f and waits: reject it with x"
-        return f"{one.label} is {one.verdict} already" if one.verdict else ""
+        if one.verdict:
+            return f"{one.label} is {one.verdict} already"
+        return ""
 
     def words(self, state: RunState) -> Words:
         return Words(
@@ -450,9 +467,9 @@ class Unveto(OfCandidate):
         one = self.meant(now.state)
         if one is None:
             return round_over(now.state)
-        return (
-            "" if one.verdict in REFUSED else f"{one.label} is neither vetoed, rejected nor undone"
-        )
+        if one.verdict in REFUSED:
+            return ""
+        return f"{one.label} is neither vetoed, rejected nor undone"
 
     def words(self, state: RunState) -> Words:
         return Words(
@@ -462,7 +479,9 @@ class Unveto(OfCandidate):
 
 def round_over(state: RunState) -> str:
     """Why candidates can no longer be left out."""
-    return "the rounds are over" if state.confirming and not state.ended else "this round is over"
+    if state.confirming and not state.ended:
+        return "the rounds are over"
+    return "this round is over"
 
 
 def _names_of(state: RunState, numbers: Sequence[int]) -> Names | None:
@@ -487,7 +506,9 @@ class Pin(Asked):
                 f"{named(gone[:1])} is removed already: go back (h) to an environment that has "
                 "it, then pin it"
             )
-        return "" if self.new(now.state) else "pinned already"
+        if self.new(now.state):
+            return ""
+        return "pinned already"
 
     def words(self, state: RunState) -> Words:
         return Words(
@@ -507,7 +528,9 @@ class Unpin(Asked):
     models: Numbers
 
     def refusal(self, now: Situation) -> str:
-        return "" if self.pinned(now.state) else "not pinned"
+        if self.pinned(now.state):
+            return ""
+        return "not pinned"
 
     def words(self, state: RunState) -> Words:
         return Words("unpin", f"unpinned: {named(self.pinned(state))}. {new_search(state)}")
@@ -538,22 +561,19 @@ class Try(Asked):
         if keep == frozenset(state.environment):
             return "that is the current environment: nothing is left out"
         under_way = (trial for trial in state.trials if not trial.verdict)
-        return (
-            "that is being tried already"
-            if any(frozenset(each.models) == keep for each in under_way)
-            else ""
-        )
+        if any(frozenset(each.models) == keep for each in under_way):
+            return "that is being tried already"
+        return ""
 
     def words(self, state: RunState) -> Words:
         names = _names_of(state, self.models) or ()
         keep = frozenset(names)
         without = [name for name in state.environment if name not in keep]
         is_part = keep < frozenset(state.environment)
-        what = (
-            f"without {named(without)}"
-            if is_part and len(without) <= len(names)
-            else f"only {named(names)}"
-        )
+        if is_part and len(without) <= len(names):
+            what = f"without {named(without)}"
+        else:
+            what = f"only {named(names)}"
         what = f"{count(len(names), 'model')}, {what}" if names else "none of the models"
         return Words("try", f"try {len(state.trials) + 1}: {what}")
 
@@ -582,7 +602,9 @@ class Adopt(Asked):
 
     def meant(self, state: RunState) -> Trial | None:
         """The try, None if no try has this number."""
-        return state.trials[self.trial - 1] if 0 < self.trial <= len(state.trials) else None
+        if 0 < self.trial <= len(state.trials):
+            return state.trials[self.trial - 1]
+        return None
 
 
 class LeaveOut(Asked):
@@ -593,7 +615,9 @@ class LeaveOut(Asked):
     model: int
 
     def refusal(self, now: Situation) -> str:
-        return NONE_HELPS if self.evidence(now.state) is None else ""
+        if self.evidence(now.state) is None:
+            return NONE_HELPS
+        return ""
 
     def words(self, state: RunState) -> Words:
         test = self.evidence(state)
@@ -618,7 +642,9 @@ class LeaveOut(Asked):
 def _lacks_pinned(state: RunState, label: str, models: Sequence[str]) -> str:
     """Why a selection cannot become the environment, or ""."""
     lacking = [name for name in state.environment if name in state.pinned and name not in models]
-    return f"{label} lacks {named(lacking)}, which is pinned: unpin it first (p)" if lacking else ""
+    if lacking:
+        return f"{label} lacks {named(lacking)}, which is pinned: unpin it first (p)"
+    return ""
 
 
 class AcceptOther(Asked):
@@ -680,7 +706,9 @@ class AcceptOther(Asked):
 
 
 def _position(pose: tuple[float, ...] | None) -> str:
-    return "an unknown place" if pose is None else f"({coordinates(pose[:3])}) m"
+    if pose is None:
+        return "an unknown place"
+    return f"({coordinates(pose[:3])}) m"
 
 
 # All of them.
@@ -725,7 +753,9 @@ def drops(command: Command, state: RunState) -> str:
 
 
 def _begins_anew(command: Command, state: RunState) -> bool:
-    return command.begins_anew(state) if isinstance(command, Change) else isinstance(command, ANEW)
+    if isinstance(command, Change):
+        return command.begins_anew(state)
+    return isinstance(command, ANEW)
 
 
 def question(command: Command, state: RunState) -> str:
@@ -743,11 +773,9 @@ def question(command: Command, state: RunState) -> str:
         )
     if not lost:
         return own
-    return (
-        f"{own}\n\n{lost}"
-        if own
-        else f"{lost}\n\n{command.words(state).brief.capitalize()} anyway?"
-    )
+    if own:
+        return f"{own}\n\n{lost}"
+    return f"{lost}\n\n{command.words(state).brief.capitalize()} anyway?"
 
 
 def said(command: Command, now: Situation) -> str:
@@ -756,11 +784,9 @@ def said(command: Command, now: Situation) -> str:
     if not words or now.engine != "absent":
         return words
     starts = starts_engine(command, now.state)
-    return (
-        f"{words}; an engine starts for it"
-        if starts
-        else f"{words}; it waits for an engine, space starts one"
-    )
+    if starts:
+        return f"{words}; an engine starts for it"
+    return f"{words}; it waits for an engine, space starts one"
 
 
 def send(file: RunFile, command: Command) -> int:

@@ -53,17 +53,17 @@ def offer(action: str, now: c.Situation, pointed: Pointed) -> Offer:
         return Offer()
     why_not = c.refusal(command, now)
     again = isinstance(command, c.StartEngine) and now.state.engines
-    return (
-        Offer(why_not=why_not)
-        if why_not
-        else Offer(command, "resume" if again else _FOOTER.get(type(command), ""))
-    )
+    if why_not:
+        return Offer(why_not=why_not)
+    return Offer(command, "resume" if again else _FOOTER.get(type(command), ""))
 
 
 def _pause(now: c.Situation, _: Pointed) -> c.Command | c.StartEngine:
     if now.engine == "absent":
         return c.StartEngine()
-    return c.Resume() if now.state.paused else c.Pause()
+    if now.state.paused:
+        return c.Resume()
+    return c.Pause()
 
 
 def _accept(now: c.Situation, pointed: Pointed) -> c.Command:
@@ -139,7 +139,9 @@ def _pin(now: c.Situation, pointed: Pointed) -> c.Command | None:
 def _try(now: c.Situation, pointed: Pointed, keep: frozenset[str]) -> c.Command | None:
     if now.state.baseline is None:
         raise UserError(c.NO_FAILURE)
-    return c.Try(c.numbers_of(now.state, keep)) if _any(now.state, pointed.models) else None
+    if _any(now.state, pointed.models):
+        return c.Try(c.numbers_of(now.state, keep))
+    return None
 
 
 def _leave_out(now: c.Situation, _: Pointed) -> c.Command:
@@ -151,7 +153,9 @@ def _leave_out(now: c.Situation, _: Pointed) -> c.Command:
 
 
 def _isolate(now: c.Situation, _: Pointed) -> c.Command | c.Isolate:
-    return c.Stop() if now.engine != "absent" and now.state.isolating is not None else c.Isolate()
+    if now.engine != "absent" and now.state.isolating is not None:
+        return c.Stop()
+    return c.Isolate()
 
 
 def _any(state: RunState, models: Collection[str]) -> bool:

@@ -64,7 +64,9 @@ def at_hand(moment: Moment) -> Foretold | None:
     event = moment.recorded.event
     if isinstance(event, TestStarted) and pointed(moment) is not None:
         return "outcome"
-    return "winner" if isinstance(event, RoundStarted) else None
+    if isinstance(event, RoundStarted):
+        return "winner"
+    return None
 
 
 # How a test ends.
@@ -149,17 +151,15 @@ def _winner(position: Position, moment: Moment) -> Foretelling | None:
         return None
     answers = [_candidate_answer(one, round) for one in shown]
     none = round.winner is None
-    why = (
-        "No candidate showed f."
-        if round.winner is None
-        else f"{_name(round.candidates[round.winner])} showed f."
-    )
+    if round.winner is None:
+        why = "No candidate showed f."
+    else:
+        why = f"{_name(round.candidates[round.winner])} showed f."
     answers.append(Answer("none of them", none, why, "" if none else "stuck"))
-    order = (
-        "tested in this order"
-        if shown == listed
-        else f"of which {len(shown)} are listed, in the order of their tests"
-    )
+    if shown == listed:
+        order = "tested in this order"
+    else:
+        order = f"of which {len(shown)} are listed, in the order of their tests"
     question = Question(
         (
             f"Round {round.number}: {count(len(listed), 'candidate')}, {order}. Which is the first "
@@ -177,11 +177,10 @@ def _winner(position: Position, moment: Moment) -> Foretelling | None:
         alone = {one.partition for one in round.candidates if one.kind == "complement"}
         kind = "last" if len(alone) == len(round.partitions) == len(round.environment) else "none"
         return Foretelling(question, chapter.last, _reason(kind, round.number), kind)
-    before = (
-        "Those before it probably lack something."
-        if round.winner
-        else "It was the first one to be tried."
-    )
+    if round.winner:
+        before = "Those before it probably lack something."
+    else:
+        before = "It was the first one to be tried."
     reason = _reason(
         "won", round.number, candidate=_name(round.candidates[round.winner]), before=before
     )
@@ -189,11 +188,10 @@ def _winner(position: Position, moment: Moment) -> Foretelling | None:
 
 
 def _candidate_answer(one: Candidate, round: Round) -> Answer:
-    words = (
-        f"{one.label}: {_named(one.models)}"
-        if one.size <= FEW
-        else f"{one.label}: {count(one.size, 'model')}"
-    )
+    if one.size <= FEW:
+        words = f"{one.label}: {_named(one.models)}"
+    else:
+        words = f"{one.label}: {count(one.size, 'model')}"
     if round.winner == one.index:
         return Answer(words, True, f"{_name(one)} showed f, so it becomes E.")
     if round.winner is not None and one.index > round.winner:
@@ -230,11 +228,10 @@ def _parts(position: Position, moment: Moment) -> Foretelling | None:
     before = len(round.environment)
     reduced = size < before
     grew = after.n_partitions > round.n_partitions
-    kept = (
-        f"{round.candidates[round.winner].label} became E"
-        if round.winner is not None
-        else "E stays as it is"
-    )
+    if round.winner is not None:
+        kept = f"{round.candidates[round.winner].label} became E"
+    else:
+        kept = "E stays as it is"
     right = (
         f"Right: {kept}, and n {f'grows by {n - round.n_partitions}' if grew else f'stays {n}'}."
     )
@@ -260,11 +257,10 @@ def _parts(position: Position, moment: Moment) -> Foretelling | None:
     )
     if len(answers) < 2:
         return None
-    asked = (
-        "no candidate showed f"
-        if round.winner is None
-        else f"{round.candidates[round.winner].label} showed f"
-    )
+    if round.winner is None:
+        asked = "no candidate showed f"
+    else:
+        asked = f"{round.candidates[round.winner].label} showed f"
     question = Question(
         f"Round {round.number} split {count(before, 'model')} into "
         f"{count(len(round.partitions), 'part')}, and {asked}. "
@@ -286,11 +282,10 @@ def _why_ended(test: Test, candidate: Candidate, options: Settings, missed: int)
     """What the outcome of a candidate's test means, the last one of so many that `missed` f."""
     if test.outcome == "pass" and options.most_runs == 1 and options.accept_rate != "kept":
         return _reason("only pass", test.id)
-    gone = (
-        "the models of the part"
-        if candidate.kind == "complement"
-        else "all models outside the part"
-    )
+    if candidate.kind == "complement":
+        gone = "the models of the part"
+    else:
+        gone = "all models outside the part"
     goes = f"f shows without {gone}: they can go."
     if options.accept_rate == "kept":
         goes = f"f can show without {gone}. More runs will tell whether it shows often enough."

@@ -103,7 +103,9 @@ class Course:
     @property
     def at(self) -> int:
         """The event that is shown."""
-        return self.position.end.revision if self.position.at is None else self.position.at
+        if self.position.at is None:
+            return self.position.end.revision
+        return self.position.at
 
     @property
     def last(self) -> int:
@@ -277,12 +279,20 @@ class Course:
     @property
     def here(self) -> LessonStep | None:
         """The step of the lesson; None at the end, or in a free walk."""
-        return self._steps[self.step] if self.step < self.last else None
+        if self.step < self.last:
+            return self._steps[self.step]
+        return None
 
     @property
     def activity(self) -> Activity | None:
         here = self.here
-        return None if here is None else "race" if here.race else "try" if here.budget else None
+        if here is None:
+            return None
+        if here.race:
+            return "race"
+        if here.budget:
+            return "try"
+        return None
 
     @property
     def attempt(self) -> Attempt | None:

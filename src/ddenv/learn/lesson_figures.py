@@ -41,7 +41,9 @@ def _certificate(state: RunState) -> Certificate | None:
 
 def _fresh(state: RunState) -> str:
     found = _certificate(state)
-    return "no fresh run" if found is None else claims.rate(found.claims[0])
+    if found is None:
+        return "no fresh run"
+    return claims.rate(found.claims[0])
 
 
 def _fresh_whole(state: RunState) -> str:
@@ -85,11 +87,9 @@ def _bound(state: RunState, without: str | None = None) -> str:
     claim = made.get(without) if made else so_far(state, now).get(without)
     if claim is None:
         raise UserError(f"at this step, no fresh run has yet left '{without}' out")
-    return (
-        percent_at_least(claim.bound or 0.0)
-        if without is None
-        else percent_at_most(claim.bound or 0.0)
-    )
+    if without is None:
+        return percent_at_least(claim.bound or 0.0)
+    return percent_at_most(claim.bound or 0.0)
 
 
 def _left(state: RunState) -> str:
@@ -102,7 +102,9 @@ def _left(state: RunState) -> str:
 
 
 def _of_baseline(state: RunState, name: str) -> str:
-    return "" if state.baseline is None else percent(getattr(state.baseline, name))
+    if state.baseline is None:
+        return ""
+    return percent(getattr(state.baseline, name))
 
 
 def _first_slice(state: RunState) -> Node | None:
@@ -218,7 +220,9 @@ def check(text: str) -> None:
 def _parts(name: str) -> tuple[str, str]:
     """The run beside the lesson's own that a name is about, or "", and the rest."""
     found = _BESIDE.fullmatch(name)
-    return (found[1], found[2]) if found else ("", name)
+    if found:
+        return (found[1], found[2])
+    return ("", name)
 
 
 def filled(text: str, value: Callable[[str], str]) -> str:
@@ -253,27 +257,29 @@ class Figures:
         if about := _ABOUT_CLAIM.fullmatch(bare):
             if about[1] == "here_bound without":
                 return _bound(self.here, about[2])
-            made = _certificate(end)
-            claim = (
-                next((one for one in made.claims if one.without == about[2]), None)
-                if made
-                else None
-            )
-            if claim is None:
-                raise UserError(
-                    f"{{without {about[2]}}}: the last certificate says nothing about '{about[2]}'"
-                )
+            claim = _claim_without(end, about[2])
             return claims.rate(claim) if about[1] == "without" else claims.short(claim)
         if self.oracle is None:
             raise UserError(f"{{{name}}} needs an oracle; give the key 'oracle'")
-        if bare in TRUE_RATES:
+        return self._of_oracle(bare, self.oracle)
+
+    def _of_oracle(self, name: str, oracle: Oracle) -> str:
+        if name in TRUE_RATES:
             sets = (self.end.elements, self.here.environment, self.end.environment)
-            return percent(self.oracle.rate(sets[TRUE_RATES.index(bare)]))
-        if of_set := _OF_SET.fullmatch(bare):
-            rate = self.oracle.rate(of_set[2].split(", "))
-            return percent(
-                rate
-                if of_set[1] == "rate"
-                else 1 - miss_chance(rate, settings(self.end).iterations)
-            )
-        return str(OF_ORACLE[bare](self.oracle))
+            return percent(oracle.rate(sets[TRUE_RATES.index(name)]))
+        of_set = _OF_SET.fullmatch(name)
+        if of_set is None:
+            return str(OF_ORACLE[name](oracle))
+        rate = oracle.rate(of_set[2].split(", "))
+        if of_set[1] == "rate":
+            return percent(rate)
+        return percent(1 - miss_chance(rate, settings(self.end).iterations))
+
+
+def _claim_without(state: RunState, model: str) -> Claim:
+    """What the last certificate claims of what is left without `model`. Raises UserError."""
+    made = _certificate(state)
+    for claim in made.claims if made else ():
+        if claim.without == model:
+            return claim
+    raise UserError(f"{{without {model}}}: the last certificate says nothing about '{model}'")

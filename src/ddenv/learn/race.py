@@ -45,7 +45,9 @@ class Turn:
 
     @property
     def split(self) -> Split | None:
-        return self.candidate.split if isinstance(self.candidate, Candidate) else None
+        if isinstance(self.candidate, Candidate):
+            return self.candidate.split
+        return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +72,9 @@ class Play:
 
     def after(self, tests: int) -> Names:
         """The models that are kept after so many tests."""
-        return self.turns[min(tests, self.tests) - 1].left if tests and self.turns else self.begins
+        if tests and self.turns:
+            return self.turns[min(tests, self.tests) - 1].left
+        return self.begins
 
 
 # Recorded with an oracle.
@@ -200,7 +204,9 @@ def kind_of(turn: Turn) -> str:
         return "again"
     if not isinstance(turn.candidate, Candidate):
         return "by hand"
-    return "part without f" if turn.candidate.kind == "partition" else "rest without f"
+    if turn.candidate.kind == "partition":
+        return "part without f"
+    return "rest without f"
 
 
 # What a test was good for, with what a search did in those without f.
@@ -237,7 +243,9 @@ class Race:
 
     def now(self, play: Play) -> Turn | None:
         """The last test that a search made; None before the first one."""
-        return play.turns[min(self.at, play.tests) - 1] if self.at else None
+        if self.at:
+            return play.turns[min(self.at, play.tests) - 1]
+        return None
 
     def is_done(self, play: Play) -> bool:
         return self.at >= play.tests
@@ -247,11 +255,10 @@ def result(plays: Sequence[Play]) -> Sentences:
     """Who won and why, in sentences; a search that did not end cannot win."""
     ended = sorted((play for play in plays if play.ended), key=lambda play: play.tests)
     open_ones = [play.name for play in plays if not play.ended]
-    said = (
-        [f"{_and(open_ones)} did not finish, so the number of tests says nothing."]
-        if open_ones
-        else []
-    )
+    if open_ones:
+        said = [f"{_and(open_ones)} did not finish, so the number of tests says nothing."]
+    else:
+        said = []
     if len(ended) < 2:
         return (*said, "So there is no winner.")
     first = ended[0]
@@ -284,7 +291,9 @@ def _in_steps(play: Play) -> str:
 
 
 def _and(names: Sequence[str]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)
+    if len(names) > 1:
+        return f"{', '.join(names[:-1])} and {names[-1]}"
+    return "".join(names)
 
 
 def bet(plays: Sequence[Play]) -> Question:
@@ -322,11 +331,10 @@ def comparison(oracle: Oracle, plays: Sequence[Play], attempt: Attempt | None) -
         yield Line("you", len(attempt.tried), attempt.held, not attempt.found)
     for play in plays:
         yield Line(play.name, play.tests, play.left, bool(oracle.could_go(play.left)))
-    size = (
-        len(attempt.held)
-        if attempt is not None and attempt.found
-        else min(map(len, oracle.minimal), default=0)
-    )
+    if attempt is not None and attempt.found:
+        size = len(attempt.held)
+    else:
+        size = min(map(len, oracle.minimal), default=0)
     yield Line("minimum", bound(len(oracle.models), size))
 
 
@@ -351,13 +359,14 @@ def in_one_sentence(oracle: Oracle, plays: Sequence[Play], attempt: Attempt) -> 
     least = bound(len(oracle.models), len(attempt.held))
     if len(attempt.tried) < least:
         luck = f"{found}, fewer than {least}: luck or a look at the map helped you."
-        return f"{luck} The algorithms: {others}." if others else luck
+        if others:
+            return f"{luck} The algorithms: {others}."
+        return luck
     if not done:
         return f"{found}; without prior knowledge it takes at least {least}."
     quicker = [play.name for play in done if play.tests < len(attempt.tried)]
-    what = (
-        f"; {first_of(quicker, NAMED)} needed fewer"
-        if quicker
-        else ", and no algorithm needed fewer"
-    )
+    if quicker:
+        what = f"; {first_of(quicker, NAMED)} needed fewer"
+    else:
+        what = ", and no algorithm needed fewer"
     return f"{found}{what}: {others}."

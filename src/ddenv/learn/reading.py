@@ -88,7 +88,9 @@ class _Node:
 
     @property
     def line(self) -> int:
-        return 1 if self.node is None else int(self.node.start_mark.line) + 1
+        if self.node is None:
+            return 1
+        return int(self.node.start_mark.line) + 1
 
     def wrong(self, why: str) -> UserError:
         key = f" {self.key}:" if self.key else ""

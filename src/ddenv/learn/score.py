@@ -78,11 +78,10 @@ def summary(asked: int, score: Score) -> list[str]:
     """The end of a lesson with so many questions `asked`, in sentences."""
     skipped = max(0, asked - len(score.answered))
     more = f"; {skipped} skipped" if skipped else ""
-    right = (
-        f"{score.right} of {len(score.answered)} questions right"
-        if score.answered
-        else "no question"
-    )
+    if score.answered:
+        right = f"{score.right} of {len(score.answered)} questions right"
+    else:
+        right = "no question"
     lines = [f"You answered {right}{more}."]
     if score.best > 1:
         lines.append(f"Your longest streak: {score.best} right answers in a row.")

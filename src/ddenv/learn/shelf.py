@@ -37,7 +37,9 @@ def find_lesson(name: str) -> Path | None:
         if name in (str(number), file.stem, file.stem.lstrip("0123456789-")):
             return file
     path = Path(name)
-    return path if path.suffix.lower() in (".yaml", ".yml") and path.is_file() else None
+    if path.suffix.lower() in (".yaml", ".yml") and path.is_file():
+        return path
+    return None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,11 +56,9 @@ class Opened:
 
     def attempt(self, step: Step, moves: Iterable[str] = ()) -> Attempt | None:
         """The student's own search in a step, after these moves; None if the step has none."""
-        return (
-            None
-            if step.budget is None or self.oracle is None
-            else Attempt(self.oracle, step.budget, moves)
-        )
+        if step.budget is None or self.oracle is None:
+            return None
+        return Attempt(self.oracle, step.budget, moves)
 
     def racers(self, step: Step) -> tuple[Play, ...]:
         return tuple(self.plays[name] for name in step.race)

@@ -40,7 +40,9 @@ def readable(back: int) -> int:
     """
     if back < 0:
         return PLAIN
-    return BLACK if luminance(back) > 110 else WHITE
+    if luminance(back) > 110:
+        return BLACK
+    return WHITE
 
 
 def luminance(color: Any) -> Any:

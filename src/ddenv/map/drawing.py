@@ -156,7 +156,9 @@ def plot(
 
 
 def _grid(value: float) -> str:
-    return "grid" if value else "grid origin"
+    if value:
+        return "grid"
+    return "grid origin"
 
 
 def tick(x: float, y: float, anchor: str, words: str) -> str:

@@ -180,11 +180,10 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
     ground = ground_height(world)
     models = [model for model in world.models if not is_ground(model)]
     outlines = [footprint(model, corners, ground=ground) for model in models]
-    limit = (
-        max(FLOOR_AREA, FLOOR_FACTOR * float(np.median([each.area for each in outlines])))
-        if models
-        else 0.0
-    )
+    if models:
+        limit = max(FLOOR_AREA, FLOOR_FACTOR * float(np.median([each.area for each in outlines])))
+    else:
+        limit = 0.0
     drawn = []
     for model, outline in zip(models, outlines, strict=True):
         center = model.pose.position
@@ -221,4 +220,6 @@ def _color(model: Model) -> RGB:
                 break
             red, green, blue = (round(255 * min(1.0, max(0.0, part))) for part in visual.color[:3])
             return red, green, blue
-    return STATIC if model.static else DYNAMIC
+    if model.static:
+        return STATIC
+    return DYNAMIC

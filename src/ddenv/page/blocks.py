@@ -97,7 +97,9 @@ class Report:
 
 
 def parts(cell: Cell) -> tuple[Part, ...]:
-    return cell if isinstance(cell, tuple) else (cell,)
+    if isinstance(cell, tuple):
+        return cell
+    return (cell,)
 
 
 def say(*words: Part, notice: bool = False) -> Paragraph:
@@ -108,7 +110,9 @@ def named(models: Sequence[str], most: int) -> tuple[Part, ...]:
     """a, b and 3 more: at most `most` of the models by name."""
     words = [part for name in models[:most] for part in (", ", Name(name))][1:]
     more = len(models) - most
-    return (*words, f" and {more} more") if more > 0 else tuple(words)
+    if more > 0:
+        return (*words, f" and {more} more")
+    return tuple(words)
 
 
 def moment(time: float) -> str:
@@ -127,4 +131,6 @@ def thousands(number: int) -> str:
 def section(data: Mapping[str, Any], key: str) -> Data:
     """A part of a scenario; empty if a damaged file has something else."""
     value = data.get(key)
-    return value if isinstance(value, dict) else {}
+    if isinstance(value, dict):
+        return value
+    return {}

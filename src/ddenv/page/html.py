@@ -74,11 +74,9 @@ def _block(block: Block) -> str:
         case Code():
             text = escape("\n".join(map(printable, block.lines)))
             shown = f"<pre>{text}</pre>"
-            return (
-                f"<details><summary>{_text(block.folded)}</summary>{shown}</details>"
-                if block.folded
-                else shown
-            )
+            if block.folded:
+                return f"<details><summary>{_text(block.folded)}</summary>{shown}</details>"
+            return shown
 
 
 def _paragraph(block: Paragraph) -> str:

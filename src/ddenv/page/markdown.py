@@ -82,7 +82,9 @@ def _block(block: Block, stem: str) -> list[str]:
             )
             shown = [fence, *map(printable, block.lines), fence]
             fold = ["<details>", f"<summary>{block.folded}</summary>", "", *shown, "", "</details>"]
-            return fold if block.folded else shown
+            if block.folded:
+                return fold
+            return shown
 
 
 def _row(row: tuple[Cell, ...], strong: bool) -> str:
@@ -106,7 +108,9 @@ def _name(text: str) -> str:
     text = plain(text)
     fence = "`" * (1 + max((len(run) for run in re.findall("`+", text)), default=0))
     space = " " if text.startswith("`") or text.endswith("`") else ""
-    return f"{fence}{space}{text}{space}{fence}".replace("|", "\\|") if text else ""
+    if text:
+        return f"{fence}{space}{text}{space}{fence}".replace("|", "\\|")
+    return ""
 
 
 def _text(text: str) -> str:

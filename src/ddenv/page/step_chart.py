@@ -70,7 +70,9 @@ def steps(points: Sequence[tuple[int, int]]) -> Steps:
         if models != corners[-1][1]:
             corners += [(tests, corners[-1][1]), (tests, models)]
     end = (points[-1][0], corners[-1][1])
-    return corners if corners[-1] == end else [*corners, end]
+    if corners[-1] == end:
+        return corners
+    return [*corners, end]
 
 
 def axes(at: At, last: int, most: int) -> Iterator[str]:

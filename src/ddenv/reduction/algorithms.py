@@ -83,7 +83,9 @@ def _split(environment: Partition, n: int, guide: Guide) -> list[Partition]:
     if guide.growth == "steady":
         return _halved(partitions, n, guide)
     # A split that leaves all models together does not count (paper, section III-B).
-    return partitions if len(partitions) > 1 else singles
+    if len(partitions) > 1:
+        return partitions
+    return singles
 
 
 def _halved(partitions: list[Partition], n: int, guide: Guide) -> list[Partition]:

@@ -132,11 +132,9 @@ def distances_to_failure(environment: Names, evidence: Evidence) -> Floats:
     """
     end = np.array(evidence.need("failure_position"))
     apart = np.linalg.norm(evidence.places(environment) - end, axis=1)
-    sizes = (
-        [evidence.traits[name].size for name in environment]
-        if evidence.traits
-        else np.zeros(len(environment))
-    )
+    if not evidence.traits:
+        return np.asarray(apart)
+    sizes = [evidence.traits[name].size for name in environment]
     return np.asarray(np.maximum(apart - np.array(sizes) / 2, 0.0))
 
 

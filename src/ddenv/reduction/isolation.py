@@ -67,7 +67,11 @@ class Passing:
         passes = leans_to(shown, missed, self.wanted, self.rather_than, self.error)
         if passes is None and shown + missed >= MOST_RUNS:
             passes = shown / (shown + missed) > math.sqrt(self.wanted * self.rather_than)
-        return "" if passes is None else ("similar" if passes else "dissimilar")
+        if passes is None:
+            return ""
+        if passes:
+            return "similar"
+        return "dissimilar"
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,11 @@ class Each:
 
     def verdict(self, shown: int, missed: int) -> Verdict:
         """As `Passing.verdict`."""
-        return "dissimilar" if missed else "similar" if shown == len(self.exact) else ""
+        if missed:
+            return "dissimilar"
+        if shown == len(self.exact):
+            return "similar"
+        return ""
 
 
 @dataclass(frozen=True)
@@ -148,7 +156,9 @@ def isolation(
             return None
         checks.append((yield from _check(driver, asked, removed, len(checks))))
         driver.checked(checks[-1])
-    return checks[-1].removed if checks[-1].passes else None
+    if checks[-1].passes:
+        return checks[-1].removed
+    return None
 
 
 def _smaller(asked: Asked, check: Checked, refuted: set[Environment]) -> Environment:
@@ -159,7 +169,9 @@ def _smaller(asked: Asked, check: Checked, refuted: set[Environment]) -> Environ
         (claim.model for claim in check.claims if claim.claim.verdict == "not needed"), None
     )
     smaller = NOTHING if needless is None else check.removed - asked.stacks.by_first[needless]
-    return NOTHING if asked.whole - smaller in refuted else smaller
+    if asked.whole - smaller in refuted:
+        return NOTHING
+    return smaller
 
 
 def _search(
@@ -221,11 +233,9 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Wor
             yield model, with_it, falls(with_it, passing, error, asked.keep_rate)
 
     def ends(claim: NamedClaim) -> bool:
-        return (
-            claim.claim.verdict != "passes"
-            if claim.model is None
-            else claim.claim.verdict == "not needed"
-        )
+        if claim.model is None:
+            return claim.claim.verdict != "passes"
+        return claim.claim.verdict == "not needed"
 
     return Checked(removed, (yield from settled(driver, claims(), ends, first, "isolate")))
 

@@ -160,11 +160,9 @@ class Learner:
         has learnt anything.
         """
         known = self._classifier
-        return (
-            np.full(len(samples), 0.5)
-            if known is None
-            else np.asarray(known.predict_proba(samples)[:, 1])
-        )
+        if known is None:
+            return np.full(len(samples), 0.5)
+        return np.asarray(known.predict_proba(samples)[:, 1])
 
 
 def _scaling(logits: Floats, gone: Floats, groups: Booleans) -> tuple[float, float]:

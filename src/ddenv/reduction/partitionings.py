@@ -42,7 +42,9 @@ def model2model(environment: Names, n_partitions: int, evidence: Evidence) -> li
         warnings.simplefilter("ignore", ConvergenceWarning)
         labels = clusters.fit(evidence.places(environment)).labels_
     partitions = grouped(environment, labels)
-    return partitions if len(partitions) == n_partitions else [(name,) for name in environment]
+    if len(partitions) == n_partitions:
+        return partitions
+    return [(name,) for name in environment]
 
 
 def timeseg(environment: Names, n_partitions: int, evidence: Evidence) -> list[Names]:

@@ -339,7 +339,9 @@ def _round(driver: Driver, leg: Leg, number: int, round: Round) -> Work[Candidat
     """Tests the candidates of a round until one is similar, and accepted; returns it, or None."""
     past = driver.round_began(number, round)
     if past is not None:
-        return None if past.winner is None else round.candidates[past.winner]
+        if past.winner is None:
+            return None
+        return round.candidates[past.winner]
     environments = [candidate.models | leg.pinned for candidate in round.candidates]
     rule = leg.rule.within(round.runs)
     while True:
@@ -347,7 +349,9 @@ def _round(driver: Driver, leg: Leg, number: int, round: Round) -> Work[Candidat
         if winner is None or driver.similar(number, winner, environments[winner]):
             break
     driver.round_ended(number, winner)
-    return None if winner is None else round.candidates[winner]
+    if winner is None:
+        return None
+    return round.candidates[winner]
 
 
 def judge(
@@ -639,7 +643,9 @@ def _in_drawn_order(tests: Iterable[NumberedRun], seed: int | None) -> list[Numb
 
 def _left_of(terms: Terms, made: int) -> float:
     """How many tests of a certificate may still be made."""
-    return math.inf if terms.most_tests is None else terms.most_tests - made
+    if terms.most_tests is None:
+        return math.inf
+    return terms.most_tests - made
 
 
 def _have_turn(of_left: NamedClaim, fresh: ShownIn) -> bool:

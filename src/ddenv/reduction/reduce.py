@@ -357,7 +357,9 @@ class _Caller:
     @property
     def share_shown(self) -> float:
         """The share of the calls with all elements that showed the failure; 1 before the first."""
-        return sum(self._of_whole) / len(self._of_whole) if self._of_whole else 1.0
+        if self._of_whole:
+            return sum(self._of_whole) / len(self._of_whole)
+        return 1.0
 
     def rate(self) -> float:
         # From the baseline, and from fresh calls up to the first not made: only where what is left
@@ -423,7 +425,9 @@ class _Caller:
         tested = (rest for rest in self._removals() if self.shown(rest, 0) is not None)
         replays += [steps.Test(environment=rest, run=1, why="certify") for rest in tested]
         self.carry_out((test,) for test in replays)
-        return None if self.flaky else alone
+        if self.flaky:
+            return None
+        return alone
 
     def _removals(self) -> list[Environment]:
         return [self.left - Environment.of((element,)) for element in self.left]
@@ -655,8 +659,12 @@ def _place(values: Any) -> Place | None:
     except (TypeError, ValueError, OverflowError):
         return None
     bounded = all(abs(number) <= LARGEST for number in (x, y, z))
-    return (x, y, z) if bounded and not isinstance(values, str) else None
+    if bounded and not isinstance(values, str):
+        return (x, y, z)
+    return None
 
 
 def _time(value: Any) -> float | None:
-    return float(value) if isinstance(value, Real) and 0 <= cast(float, value) <= LARGEST else None
+    if isinstance(value, Real) and 0 <= cast(float, value) <= LARGEST:
+        return float(value)
+    return None

@@ -86,14 +86,18 @@ class Acceptance:
         if not shown and missed >= self.most_misses:
             return "dissimilar"
         if not self.rate:
-            return "similar" if shown else ""
+            if shown:
+                return "similar"
+            return ""
         return _by_bayes(self.rate, self.keep_rate, self.steps_back, shown, missed)
 
     def within(self, runs: int | None) -> Acceptance:
         """The same rule, by which `runs` runs without f and none with it are enough; None leaves it
         as it is.
         """
-        return self if runs is None else replace(self, most_misses=min(runs, self.most_misses))
+        if runs is None:
+            return self
+        return replace(self, most_misses=min(runs, self.most_misses))
 
     @property
     def misses(self) -> int:
@@ -121,7 +125,9 @@ def _by_bayes(rate: float, keep_rate: float, steps_back: int, shown: int, missed
     is_open = shown + missed < MOST_RUNS
     if keeps >= (0.85 if steps_back == 0 else 0.94) or (keeps > 0.5 and not is_open):
         return "similar"
-    return "" if is_open and keeps > 0.03 else "dissimilar"
+    if is_open and keeps > 0.03:
+        return ""
+    return "dissimilar"
 
 
 class Decision(NamedTuple):
@@ -200,4 +206,6 @@ def unproven(shown: Callable[..., Shown], candidate: Environment, rule: Rule) ->
     be made.
     """
     run = next(run for run in map(rule.run, count()) if shown(candidate, run) is True)
-    return run if shown(candidate, run, full=True) is None else None
+    if shown(candidate, run, full=True) is None:
+        return run
+    return None

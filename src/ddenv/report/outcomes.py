@@ -136,9 +136,10 @@ def _tests(state: RunState) -> list[Block]:
         "test did not show f, and "
         f"{thousands(state.cut_tests)} ended early: {WHY}"
     )
-    idle = (
-        f"; {thousands(ahead)} were started early by idle workers and not needed" if ahead else ""
-    )
+    if ahead:
+        idle = f"; {thousands(ahead)} were started early by idle workers and not needed"
+    else:
+        idle = ""
     off = [say(as_sentence(said))] if (said := why_off(state)) else []
     return [table, say(f"{words}{idle}."), *off, *_slices(state)]
 
@@ -147,11 +148,10 @@ def _slices(state: RunState) -> list[Block]:
     """What was known, and what went, without a test."""
     blocks: list[Block] = []
     if state.implied:
-        audits = (
-            f"; {thousands(state.audits)} more were simulated anyway, for comparison"
-            if state.audits
-            else ""
-        )
+        if state.audits:
+            audits = f"; {thousands(state.audits)} more were simulated anyway, for comparison"
+        else:
+            audits = ""
         known = (
             f"{thousands(state.implied)} of the tests were not simulated: finished runs imply "
             f"them{audits}."
@@ -204,9 +204,10 @@ def others_met(record: Record) -> Section | None:
     rows = []
     for each in found[:MOST]:
         size = f"{count(each.size, 'model')} (test {each.smallest})"
-        away = (
-            "" if state.f_position is None else f"{math.dist(state.f_position, each.position):.2f}"
-        )
+        if state.f_position is None:
+            away = ""
+        else:
+            away = f"{math.dist(state.f_position, each.position):.2f}"
         models = named(state.models_of(state.test(each.smallest)), MOST_NAMES) or "none"
         rows.append((each.name, away, thousands(len(each.tests)), size, models))
     more = len(found) - MOST
@@ -223,11 +224,10 @@ def worth(record: Record) -> Section | None:
     rows = [each for each in fresh_runs(state)[:MOST_ROWS] if each.shows]
     if found is not None:
         return Section("What the result is worth", tuple(_with(state, found)))
-    claimed = (
-        "what its runs have shown so far still holds"
-        if rows
-        else "nothing is claimed about what is left"
-    )
+    if rows:
+        claimed = "what its runs have shown so far still holds"
+    else:
+        claimed = "nothing is claimed about what is left"
     so_far = drift(state)
     first = as_sentence(f"{missing(state)}: {claimed}")
     blocks: list[Block] = [say(first, f" From all runs so far: {so_far[0]}." if so_far else "")]
@@ -247,9 +247,10 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
         has_rate = each.runs and not each.is_chosen
         shown = percent(each.shown / each.runs) if has_rate else "–"
         is_exact = each.claim is not None and each.claim.is_exact
-        interval = (
-            f"{percent(each.low)} to {percent(each.high)}" if has_rate and not is_exact else "–"
-        )
+        if has_rate and not is_exact:
+            interval = f"{percent(each.low)} to {percent(each.high)}"
+        else:
+            interval = "–"
         meaning = each.shows if each.claim is None else means(state, found, each.claim)
         rows.append((_name(each), thousands(each.runs), ended, shown, interval, meaning))
     words = (
@@ -272,7 +273,9 @@ def _name(each: FreshRuns) -> Cell:
     if each.is_left:
         return "what is left"
     world = "the whole world" if each.node == 0 else f"environment {each.node}"
-    return f"{world}, with seeds that did not show f in what is left" if each.is_chosen else world
+    if each.is_chosen:
+        return f"{world}, with seeds that did not show f in what is left"
+    return world
 
 
 def rate_of_left(state: RunState) -> tuple[str, str]:

@@ -47,7 +47,9 @@ def settings(record: Record) -> Section:
 def value_words(value: Any) -> str:
     """The value of a setting as people write it; "" for none."""
     if isinstance(value, bool):
-        return "yes" if value else "no"
+        if value:
+            return "yes"
+        return "no"
     if value is None or isinstance(value, (dict, list)):
         return ""
     return plain(f"{value:g}" if isinstance(value, float) else value)[:LONGEST_VALUE]

@@ -108,11 +108,10 @@ def _standing(record: Record) -> Paragraph:
         "created": ("Not started yet:", " no test has been made."),
     }.get(state.status, ("This run has not ended.", f" This report shows what was known{at}."))
     if not (state.ended or state.status == "created" or record.alive):
-        words = (
-            f" The engine is not running; its last message came{at}."
-            if at
-            else " The engine is not running."
-        )
+        if at:
+            words = f" The engine is not running; its last message came{at}."
+        else:
+            words = " The engine is not running."
     return say(Strong(title), words, notice=True)
 
 

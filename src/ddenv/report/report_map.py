@@ -148,7 +148,9 @@ def _sort(record: Record, name: str) -> str:
     if name not in record.elements:
         return "still"
     kept = "kept" if name in record.kept else "gone"
-    return "whole" if record.state.baseline is None else kept
+    if record.state.baseline is None:
+        return "whole"
+    return kept
 
 
 def _model(each: Drawn, sort: str, frame: Frame, coarse: bool) -> str:

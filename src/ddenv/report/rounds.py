@@ -96,7 +96,9 @@ def guiding(record: Record) -> Section | None:
         blocks += [say(f"{count(len(rows), 'decision')} {lead}"), done]
     elif state.baseline is not None:
         blocks.append(say("The user changed nothing: every reduction is the algorithm's own."))
-    return Section("Decisions", tuple(blocks)) if blocks else None
+    if blocks:
+        return Section("Decisions", tuple(blocks))
+    return None
 
 
 def _cut(rows: Sequence[tuple[Cell, ...]], most: int, words: int) -> tuple[tuple[Cell, ...], ...]:

@@ -139,4 +139,6 @@ def _tried(read: Callable[[], T], troubles: list[str]) -> T | None:
 
 def _path(file: RunFile, test: int | None, troubles: list[str]) -> array[float] | None:
     samples = None if test is None else _tried(lambda: file.motion(test), troubles)
-    return samples if samples and all(map(math.isfinite, samples)) else None
+    if samples and all(map(math.isfinite, samples)):
+        return samples
+    return None

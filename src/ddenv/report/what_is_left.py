@@ -80,11 +80,15 @@ def _models(record: Record) -> list[Block]:
         columns["removing it drops"] = [named(fallen, MOST_DROPPED) for fallen in carried]
     table = Table(tuple(columns), tuple(zip(*columns.values(), strict=True)), right)
     more = len(state.environment) - len(names)
-    return [table, say(f"And {count(more, 'more model')}.")] if more else [table]
+    if more:
+        return [table, say(f"And {count(more, 'more model')}.")]
+    return [table]
 
 
 def _size(each: Drawn) -> str:
-    return " × ".join(f"{part:.2f}" for part in each.size) if each.outline.polygons else "no shapes"
+    if each.outline.polygons:
+        return " × ".join(f"{part:.2f}" for part in each.size)
+    return "no shapes"
 
 
 def why(record: Record) -> Section | None:
@@ -124,7 +128,9 @@ def why(record: Record) -> Section | None:
                     passes.gone,
                 )
             )
-    return Section("Why it fails", tuple(blocks)) if blocks else None
+    if blocks:
+        return Section("Why it fails", tuple(blocks))
+    return None
 
 
 def margins(record: Record) -> Section | None:

@@ -63,9 +63,10 @@ def load(
     `method`, or if its module cannot be imported.
     """
     name, _, attribute = BUILT_IN.get(use, use).partition(":")
-    module = (
-        importlib.import_module(name) if use in BUILT_IN else _import(name, folder.resolve(), key)
-    )
+    if use in BUILT_IN:
+        module = importlib.import_module(name)
+    else:
+        module = _import(name, folder.resolve(), key)
     found = getattr(module, attribute, None)
     if not callable(found):
         classes = [
@@ -88,11 +89,10 @@ def _import(name: str, folder: Path, key: str) -> ModuleType:
     top = name.partition(".")[0]
     if _has(folder, top):
         loaded = sys.modules.get(top)
-        places = (
-            []
-            if loaded is None
-            else [getattr(loaded, "__file__", None), *getattr(loaded, "__path__", ())]
-        )
+        if loaded is None:
+            places = []
+        else:
+            places = [getattr(loaded, "__file__", None), *getattr(loaded, "__path__", ())]
         elsewhere = loaded is not None and not any(
             place and Path(place).is_relative_to(folder) for place in places
         )
@@ -260,7 +260,9 @@ def _number(value: Any, what: str) -> float:
 
 
 def _kind(value: Any) -> str:
-    return "None" if value is None else f"a value of type {type(value).__name__}"
+    if value is None:
+        return "None"
+    return f"a value of type {type(value).__name__}"
 
 
 def described(error: BaseException) -> str:

@@ -61,7 +61,9 @@ def kind_of(trajectory: Floats, fell: bool, arrived: float | None) -> str:
         trajectory[trajectory[:, 0] <= max(arrived, trajectory[0, 0])]
     ):
         return "lost"
-    return "stuck" if _is_still(trajectory) else "out of time"
+    if _is_still(trajectory):
+        return "stuck"
+    return "out of time"
 
 
 def _is_still(trajectory: Floats) -> bool:
@@ -107,7 +109,9 @@ class Judgement:
 def judge(result: RunResult, failure: Failure) -> Judgement:
     """The outcome of a run with regard to f (`is_similar_failure` of the paper)."""
     judgement = judge_trajectory(result.trajectory, failure)
-    return judgement if result.outcome == "failed" else replace(judgement, outcome=result.outcome)
+    if result.outcome == "failed":
+        return judgement
+    return replace(judgement, outcome=result.outcome)
 
 
 def judge_trajectory(trajectory: Floats, failure: Failure) -> Judgement:

@@ -55,7 +55,9 @@ def sign(node: Node, here: int) -> str:
         return HERE
     if node.rejected or node.lost_rate:
         return REJECTED
-    return MINIMAL if node.minimal else OTHER
+    if node.minimal:
+        return MINIMAL
+    return OTHER
 
 
 def words(node: Node, here: int) -> str:

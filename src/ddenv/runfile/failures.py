@@ -120,6 +120,8 @@ def alike(ends: list[Place], epsilon: float) -> list[list[int]]:
 
     def apart(first: int, second: int) -> float | None:
         distance = math.dist(ends[first], ends[second])
-        return distance if distance <= epsilon else None
+        if distance <= epsilon:
+            return distance
+        return None
 
     return grouped(len(ends), apart)

@@ -83,11 +83,9 @@ def steps(
 def recorded_scenario(scenario: Data) -> Data:
     """A scenario as a run file has it: where it does not say so, seeds were consecutive."""
     reduction = scenario.get("reduction")
-    return (
-        scenario | {"reduction": {"seeds": "consecutive"} | reduction}
-        if isinstance(reduction, dict)
-        else scenario
-    )
+    if isinstance(reduction, dict):
+        return scenario | {"reduction": {"seeds": "consecutive"} | reduction}
+    return scenario
 
 
 def created(state: RunState, event: e.Created, _: float) -> Changes:
@@ -193,11 +191,9 @@ def _stopped(state: RunState, at: float) -> Changes:
 
 def clock_jumped(state: RunState, event: e.ClockJumped, at: float) -> Changes:
     """Nobody worked in that time."""
-    return (
-        {}
-        if state.started_at is None
-        else {"started_at": min(at, state.started_at + event.seconds)}
-    )
+    if state.started_at is None:
+        return {}
+    return {"started_at": min(at, state.started_at + event.seconds)}
 
 
 def _stands(state: RunState) -> bool:
@@ -381,11 +377,10 @@ def digest(parts: Iterable[Environment]) -> int:
 def accept_mode_changed(state: RunState, event: e.AcceptModeChanged, at: float) -> Changes:
     if event.mode == state.accept_mode:
         return {}
-    words = (
-        "reductions wait for accept or reject"
-        if event.mode == "ask"
-        else "reductions are accepted automatically"
-    )
+    if event.mode == "ask":
+        words = "reductions wait for accept or reject"
+    else:
+        words = "reductions are accepted automatically"
     return {"accept_mode": event.mode, **decision(state, at, "accept_mode", words)}
 
 
@@ -395,11 +390,9 @@ def vetoed(state: RunState, event: e.Vetoed, at: float) -> Changes:
         **with_candidate(state, candidate),
         **refused(state, candidate.kept, event.verdict, event.round),
     }
-    return (
-        changes
-        if event.again
-        else changes | decision(state, at, "veto", f"vetoed {_described(state, candidate)}")
-    )
+    if event.again:
+        return changes
+    return changes | decision(state, at, "veto", f"vetoed {_described(state, candidate)}")
 
 
 def unvetoed(state: RunState, event: e.Unvetoed, at: float) -> Changes:

@@ -64,7 +64,9 @@ def certificate_finished(state: RunState, event: e.CertificateFinished, _: float
 
 
 def _name(state: RunState, model: int | None) -> str | None:
-    return None if model is None else state.elements[model]
+    if model is None:
+        return None
+    return state.elements[model]
 
 
 def _check_tests(state: RunState, tests: Sequence[int]) -> None:
@@ -94,11 +96,10 @@ def left_out(state: RunState, event: e.LeftOut, at: float) -> Changes:
     runs = [test.id for test in state.confirm_tests if test.environment == event.environment]
     what = f"without {listed([without])}"
     how = "left_out" if event.by_user else "certified"
-    said = (
-        decision(state, at, "leave_out", f"left out {listed([without])}, which only helped")
-        if event.by_user
-        else {}
-    )
+    if event.by_user:
+        said = decision(state, at, "leave_out", f"left out {listed([without])}, which only helped")
+    else:
+        said = {}
     return arrived(state, event.environment, event.evidence_test, at, how, what, runs) | said
 
 

@@ -52,11 +52,10 @@ def trial_started(state: RunState, event: e.TrialStarted, at: float) -> Changes:
         raise ValueError(trial.number)
     inside = frozenset(names)
     without = [name for name in state.environment if name not in inside]
-    what = (
-        f"without {listed(without)}"
-        if 0 < len(without) <= trial.size
-        else f"with {listed(names)} alone"
-    )
+    if 0 < len(without) <= trial.size:
+        what = f"without {listed(without)}"
+    else:
+        what = f"with {listed(names)} alone"
     words = f"tried {trial.size} of {len(state.environment)} models ({trial.label}): {what}"
     return {"trials": (*state.trials, trial), **decision(state, at, "try", words)}
 
@@ -107,7 +106,9 @@ def accepted_other(state: RunState, event: e.AcceptedOther, at: float) -> Change
 
 def _unpinned(state: RunState, gone: frozenset[str]) -> str:
     """Models that are not in the new environment cannot stay pinned."""
-    return f"; unpinned {listed([name for name in state.elements if name in gone])}" if gone else ""
+    if gone:
+        return f"; unpinned {listed([name for name in state.elements if name in gone])}"
+    return ""
 
 
 def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
@@ -161,7 +162,9 @@ def changed(state: RunState, event: e.Changed, at: float) -> Changes:
     if event.baseline is not None:
         return changes | _judged_anew(state, event.baseline, at)
     # The budget does not affect the search.
-    return changes if set(event.settings) == {"budget"} else changes | searched_anew(state)
+    if set(event.settings) == {"budget"}:
+        return changes
+    return changes | searched_anew(state)
 
 
 def with_settings(scenario: Data, new: Mapping[str, Any]) -> Data:
@@ -251,11 +254,10 @@ def arrived(
     )
     inside = state.environments[number] <= state.environments[state.nodes[state.node].id]
     # Nothing is known yet about what another failure needs.
-    needed = (
-        min(state.lower_bound, len(environment))
-        if inside and how not in ("accepted", "instead")
-        else 0
-    )
+    if inside and how not in ("accepted", "instead"):
+        needed = min(state.lower_bound, len(environment))
+    else:
+        needed = 0
     changes = {} if how == "reduced" else left_round(state) | {"search_due": True}
     return changes | at_node(state, node, needed) | {"nodes": (*state.nodes, node)}
 
@@ -366,11 +368,9 @@ def left_round(state: RunState) -> Changes:
 def without_open(state: RunState) -> tuple[Isolation, ...]:
     """All isolations; the one that is under way, if there is one, is broken off."""
     last = state.isolating
-    return (
-        state.isolations
-        if last is None
-        else (*state.isolations[:-1], replace(last, broken_off=True))
-    )
+    if last is None:
+        return state.isolations
+    return (*state.isolations[:-1], replace(last, broken_off=True))
 
 
 def waits_no_more(state: RunState) -> Changes:

@@ -40,7 +40,9 @@ def faults(file: RunFile) -> list[str]:
             rows = db.execute(f"PRAGMA integrity_check({MOST_FAULTS})").fetchall()
     except sqlite3.Error as error:
         return [str(error)]
-    return [] if rows == [("ok",)] else [" ".join(str(words).split()) for (words,) in rows]
+    if rows == [("ok",)]:
+        return []
+    return [" ".join(str(words).split()) for (words,) in rows]
 
 
 def whole(file: RunFile, keep: Callable[[Recorded], None] = lambda _: None) -> Whole:

@@ -135,11 +135,15 @@ class Position:
     @property
     def now(self) -> RunState:
         """The state at the position."""
-        return self.end if self.at is None else self.state(self.at)
+        if self.at is None:
+            return self.end
+        return self.state(self.at)
 
     def stops(self, what: Step) -> Sequence[int]:
         """The events that a step of this kind goes to, but for the end."""
-        return [each.last for each in self.chapters] if what == "round" else self._stops[what]
+        if what == "round":
+            return [each.last for each in self.chapters]
+        return self._stops[what]
 
     @property
     def ids(self) -> Sequence[int]:
@@ -155,7 +159,9 @@ class Position:
     def state(self, id: int) -> RunState:
         """The state after the last event up to `id`."""
         found = self.moment(id)
-        return self._kept[0] if found is None else found.after
+        if found is None:
+            return self._kept[0]
+        return found.after
 
     def moment(self, id: int) -> Moment | None:
         """The last event up to `id`; None if there is none."""
@@ -174,7 +180,9 @@ class Position:
 
     def start_of(self, test: int) -> Moment | None:
         """The moment in which a test started; None if there is no such test."""
-        return self.moment(self._starts[test - 1]) if 0 < test <= len(self._starts) else None
+        if 0 < test <= len(self._starts):
+            return self.moment(self._starts[test - 1])
+        return None
 
     def go(self, id: int | None) -> None:
         """Goes to the last event up to `id`, or to the end."""

@@ -18,7 +18,9 @@ class Settings(Reduction, Failure):
     @property
     def most_runs(self) -> int:
         """How many runs without f, and none with it, a candidate may have."""
-        return self.exact_seeds if self.accept_rate == "exact" else 1 + self.iterations
+        if self.accept_rate == "exact":
+            return self.exact_seeds
+        return 1 + self.iterations
 
     @property
     def reduces_one_run(self) -> bool:

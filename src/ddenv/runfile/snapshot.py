@@ -47,9 +47,9 @@ class Snapshot:
         """The version of the run's last engine, if it is another version than this program's;
         otherwise "", or if unknown.
         """
-        return (
-            self.state.engine_version if self.version not in ("", self.state.engine_version) else ""
-        )
+        if self.version not in ("", self.state.engine_version):
+            return self.state.engine_version
+        return ""
 
     @property
     def status(self) -> str:
@@ -57,14 +57,18 @@ class Snapshot:
         if self.engine == "starting":
             return "starting"
         known = self.state.ended or self.behind or self.past or self.state.status == "created"
-        return self.state.status if known or self.engine == "alive" else "lost"
+        if known or self.engine == "alive":
+            return self.state.status
+        return "lost"
 
     @property
     def running(self) -> tuple[Test, ...]:
         """The tests that run now, in the order they were started; none when no engine is there to
         run them.
         """
-        return self.state.running_tests if self.engine == "alive" or self.past else ()
+        if self.engine == "alive" or self.past:
+            return self.state.running_tests
+        return ()
 
     @property
     def focus(self) -> Candidate | None:

@@ -72,7 +72,9 @@ class PersistentTuple(Sequence[Item]):
                 )
 
     def __len__(self) -> int:
-        return CHUNK * (len(self.chunks) - 1) + len(self.chunks[-1]) if self.chunks else 0
+        if self.chunks:
+            return CHUNK * (len(self.chunks) - 1) + len(self.chunks[-1])
+        return 0
 
     @overload
     def __getitem__(self, index: int) -> Item: ...
@@ -252,14 +254,18 @@ class RunState:
         base = self.baseline
         test = self.f_test
         if base is None or test is None or test.id == base.failure_test or test.end_pose is None:
-            return None if base is None else base.position
+            if base is None:
+                return None
+            return base.position
         x, y, z = test.end_pose[:3]
         return x, y, z
 
     @property
     def failure(self) -> str:
         """How the robot failed in f, in a word; "" if unknown."""
-        return "" if self.f_test is None else self.f_test.failure
+        if self.f_test is None:
+            return ""
+        return self.f_test.failure
 
     @property
     def cut_tests(self) -> int:
@@ -276,12 +282,16 @@ class RunState:
         """The maximum number of tests, None for no limit."""
         reduction = self.scenario.get("reduction")
         most = reduction.get("budget") if isinstance(reduction, dict) else None
-        return most if isinstance(most, int) and most > 0 else None
+        if isinstance(most, int) and most > 0:
+            return most
+        return None
 
     @property
     def here(self) -> Node | None:
         """The current node; None before the first event."""
-        return self.nodes[self.node] if self.nodes else None
+        if self.nodes:
+            return self.nodes[self.node]
+        return None
 
     @property
     def path(self) -> tuple[Node, ...]:
@@ -325,7 +335,9 @@ class RunState:
     def margining(self) -> Margins | None:
         """The search for margins that is not over, if there is one: an engine goes on with it."""
         last = self.margins
-        return None if last is None or last.ended or last.broken_off else last
+        if last is None or last.ended or last.broken_off:
+            return None
+        return last
 
     @property
     def certified(self) -> bool:
@@ -347,7 +359,9 @@ class RunState:
     def outcomes(self) -> dict[str, int]:
         """Finished tests by outcome, in the order of `OUTCOMES`."""
         counts = {outcome: self.tally[outcome] for outcome in OUTCOMES}
-        return counts | {"failed": self.tally["failed"]} if self.tally["failed"] else counts
+        if self.tally["failed"]:
+            return counts | {"failed": self.tally["failed"]}
+        return counts
 
     @property
     def ahead(self) -> int:
@@ -446,7 +460,9 @@ class Candidate:
     def kept(self) -> Environment:
         """Its models."""
         part = self.split.parts[self.partition]
-        return part | self.split.always if self.kind == "partition" else self.split.whole - part
+        if self.kind == "partition":
+            return part | self.split.always
+        return self.split.whole - part
 
     @property
     def models(self) -> Names:
@@ -462,15 +478,17 @@ class Candidate:
         """How many models it has."""
         split = self.split
         part = len(self.split.partitions[self.partition])
-        return (
-            part + len(split.pinned) if self.kind == "partition" else len(split.environment) - part
-        )
+        if self.kind == "partition":
+            return part + len(split.pinned)
+        return len(split.environment) - part
 
     @property
     def label(self) -> str:
         letters = self.split.letters
         letter = partition_letter(letters[self.partition] if letters else self.partition)
-        return f"part {letter}" if self.kind == "partition" else f"without {letter}"
+        if self.kind == "partition":
+            return f"part {letter}"
+        return f"without {letter}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

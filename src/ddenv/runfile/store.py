@@ -84,7 +84,9 @@ class Recorded:
     def data(self) -> Data:
         """What the file says of it, as JSON."""
         fields: Data = plain(self.event)
-        return fields if self.command is None else fields | {"command": self.command}
+        if self.command is None:
+            return fields
+        return fields | {"command": self.command}
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,11 +210,10 @@ class RunFile:
         if application != APPLICATION_ID:
             raise UserError(f"{path}: is not a ddenv run file")
         if not OLDEST_VERSION <= version <= SCHEMA_VERSION:
-            which = (
-                "a newer ddenv"
-                if version > SCHEMA_VERSION
-                else "a ddenv from before its first release"
-            )
+            if version > SCHEMA_VERSION:
+                which = "a newer ddenv"
+            else:
+                which = "a ddenv from before its first release"
             words = (
                 f"was written by {which} (format {version}); this one reads format {SCHEMA_VERSION}"
             )
@@ -272,7 +273,9 @@ class RunFile:
     def last_command(self) -> int:
         """The id of the last request; 0 before the first one."""
         row = self._one("SELECT max(id) FROM command")
-        return int(row[0]) if row and row[0] else 0
+        if row and row[0]:
+            return int(row[0])
+        return 0
 
     def send(self, kind: str, **data: Any) -> int:
         """Sends a command to the engine; returns its id. Raises UserError."""
@@ -284,7 +287,9 @@ class RunFile:
         row = self._one(
             "SELECT samples FROM motion WHERE test = ? AND model = ?", (self._made(test), ROBOT)
         )
-        return None if row is None else _floats(row[0], self.path)
+        if row is None:
+            return None
+        return _floats(row[0], self.path)
 
     def trajectory(self, test: int) -> array[float]:
         """Samples of the robot in a finished test, flat rows of `COLUMNS` floats. Raises UserError
@@ -309,7 +314,9 @@ class RunFile:
     def _made(self, test: int) -> int:
         """The test that has the samples of `test`: itself, or the one that implies it."""
         row = self._one("SELECT samples FROM motion WHERE test = ? AND model = ?", (test, ROBOT))
-        return row[0] if row is not None and isinstance(row[0], int) else test
+        if row is not None and isinstance(row[0], int):
+            return row[0]
+        return test
 
     def live(self) -> list[Live]:
         """The running tests, by worker slot."""
@@ -404,7 +411,9 @@ class RunFile:
 
     def _one(self, query: str, values: tuple[Any, ...] = ()) -> tuple[Any, ...] | None:
         rows = self._all(query, values)
-        return rows[0] if rows else None
+        if rows:
+            return rows[0]
+        return None
 
     def _all(self, query: str, values: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
         try:

@@ -16,11 +16,10 @@ def drops(state: RunState, tried: Candidate | Trial) -> Names:
     """The models of a candidate or a trial that fall when the others of its environment go."""
     if not state.supports:
         return ()
-    before = (
-        tried.split.environment
-        if isinstance(tried, Candidate)
-        else state.nodes[tried.node].environment
-    )
+    if isinstance(tried, Candidate):
+        before = tried.split.environment
+    else:
+        before = state.nodes[tried.node].environment
     return dropped(state.supports, tried.models, before)
 
 
@@ -41,7 +40,9 @@ def stacks_of(state: RunState, environment: Names) -> tuple[Names, ...]:
 def stack_with(state: RunState, environment: Names, name: str | None) -> Names:
     """The models that go together with a model, itself included; none for None."""
     found = (stack for stack in stacks_of(state, environment) if name in stack)
-    return () if name is None else next(found, (name,))
+    if name is None:
+        return ()
+    return next(found, (name,))
 
 
 def dropped(supports: Pairs, keep: Iterable[str], environment: Iterable[str]) -> Names:

@@ -20,21 +20,23 @@ def purpose(state: RunState, test: Test) -> str:
     if row is not None:
         return f"{f'round {test.round} · ' if isinstance(row, Candidate) else ''}{row.label}"
     if test.phase == "round":
-        return (
-            "what is left, with a chosen seed" if test.candidate is None else f"round {test.round}"
-        )
+        if test.candidate is None:
+            return "what is left, with a chosen seed"
+        return f"round {test.round}"
     if test.phase == "audit":
         return "an audit of the slice"
     if test.removal is not None:
         gone = state.removals[test.removal - 1].models
-        return (
-            f"the whole world without {first_of(gone, 1)}" if gone else "the whole world, in full"
-        )
+        if gone:
+            return f"the whole world without {first_of(gone, 1)}"
+        return "the whole world, in full"
     if test.phase == CERTIFY:
         environment = state.nodes[test.node].environment
         gone = stack_with(state, environment, test.without)
         whole = "the whole world" if len(environment) == len(state.elements) else "what is left"
-        return f"{whole} without {first_of(gone, 1)}" if gone else f"{whole}, in full"
+        if gone:
+            return f"{whole} without {first_of(gone, 1)}"
+        return f"{whole}, in full"
     return "baseline"
 
 
@@ -56,15 +58,15 @@ def made_for(state: RunState, test: Test | Wanted) -> Candidate | Trial | None:
     wanted.
     """
     if test.trial is not None:
-        return state.trials[test.trial - 1] if 0 < test.trial <= len(state.trials) else None
+        if 0 < test.trial <= len(state.trials):
+            return state.trials[test.trial - 1]
+        return None
     current = state.round
     if current is None or test.round != current.number or test.candidate is None:
         return None
-    return (
-        current.candidates[test.candidate]
-        if 0 <= test.candidate < len(current.candidates)
-        else None
-    )
+    if 0 <= test.candidate < len(current.candidates):
+        return current.candidates[test.candidate]
+    return None
 
 
 def adoptable(state: RunState) -> Trial | None:
@@ -84,7 +86,9 @@ def told(moment: Moment) -> Test | None:
     if isinstance(event, TestFinished | Implied):
         return state.test(event.test)
     row = pointed(moment) if isinstance(event, CandidateJudged) else None
-    return state.test(row.tests[-1]) if row is not None and row.tests else None
+    if row is not None and row.tests:
+        return state.test(row.tests[-1])
+    return None
 
 
 def pointed(moment: Moment) -> Candidate | None:
@@ -95,9 +99,9 @@ def pointed(moment: Moment) -> Candidate | None:
     event = moment.recorded.event
     if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
         row = made_for(state, state.test(event.test))
-        return row if isinstance(row, Candidate) else None
-    return (
-        state.round.candidates[event.candidate]
-        if state.round and isinstance(event, OfCandidate)
-        else None
-    )
+        if isinstance(row, Candidate):
+            return row
+        return None
+    if state.round and isinstance(event, OfCandidate):
+        return state.round.candidates[event.candidate]
+    return None

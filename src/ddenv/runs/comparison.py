@@ -74,7 +74,9 @@ def differences(
 
 
 def _value(value: Any) -> str:
-    return NONE if value is None else truncated(plain(value), LONGEST)
+    if value is None:
+        return NONE
+    return truncated(plain(value), LONGEST)
 
 
 def _names(run: Recent, other: Recent, *, in_both: bool) -> str:
@@ -82,7 +84,9 @@ def _names(run: Recent, other: Recent, *, in_both: bool) -> str:
     not.
     """
     names = [plain(name) for name in run.kept if (name in other.kept) == in_both]
-    return f"{len(names)}: {first_of(names, MOST_COMPARED)}" if names else NONE
+    if names:
+        return f"{len(names)}: {first_of(names, MOST_COMPARED)}"
+    return NONE
 
 
 def as_recent(name: str, subject: Subject) -> Recent:

@@ -40,7 +40,9 @@ def find_run(name: str) -> Path:
         return path
     stored = path if len(path.parts) > 1 else runs_folder() / f"{name.removesuffix(SUFFIX)}{SUFFIX}"
     bundled = path / BUNDLED_RUN
-    return bundled if not stored.is_file() and bundled.is_file() else stored
+    if not stored.is_file() and bundled.is_file():
+        return bundled
+    return stored
 
 
 def named(name: str) -> tuple[Literal["run", "scenario", "world"], Path] | None:
@@ -123,8 +125,6 @@ def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
             )
         return output
     folder = output or runs_folder()
-    return (
-        free_run_path(scenario_name, folder)
-        if name is None
-        else folder / f"{name.removesuffix(SUFFIX)}{SUFFIX}"
-    )
+    if name is None:
+        return free_run_path(scenario_name, folder)
+    return folder / f"{name.removesuffix(SUFFIX)}{SUFFIX}"

@@ -54,11 +54,15 @@ class Played:
     @property
     def length(self) -> float:
         """How long the test lasted, simulated s."""
-        return self.rows[-COLUMNS] if self.rows else 0.0
+        if self.rows:
+            return self.rows[-COLUMNS]
+        return 0.0
 
     def pose(self, time: float) -> Pose | None:
         """Where the robot was at simulated `time`, s; None if that is not stored."""
-        return pose_at(self.robot, time) if self.rows else None
+        if self.rows:
+            return pose_at(self.robot, time)
+        return None
 
 
 def played(file: RunFile, position: Position, number: int) -> Played:
@@ -75,9 +79,10 @@ def played(file: RunFile, position: Position, number: int) -> Played:
     if not test.is_finished:
         why = "is still running" if test.outcome == "running" else "was lost"
         raise UserError(f"test {number} {why}: only a finished test is stored")
-    lacks = (
-        [ANOTHER_SIMULATOR] if (position.end.scenario.get("oracle") or {}).get("command") else []
-    )
+    if (position.end.scenario.get("oracle") or {}).get("command"):
+        lacks = [ANOTHER_SIMULATOR]
+    else:
+        lacks = []
     try:
         start = position.start_of(number)
         words = purpose(position.end if start is None else start.after, test)
@@ -135,8 +140,6 @@ def _stored(file: RunFile, number: int, lacks: list[str]) -> dict[str, array[flo
 
 def table(samples: array[float]) -> np.ndarray:
     """Samples of a run file as rows (N, 8): t (s), x, y, z (m), qw, qx, qy, qz."""
-    return (
-        np.frombuffer(samples, dtype=float).reshape(-1, COLUMNS)
-        if samples
-        else np.zeros((0, COLUMNS))
-    )
+    if samples:
+        return np.frombuffer(samples, dtype=float).reshape(-1, COLUMNS)
+    return np.zeros((0, COLUMNS))

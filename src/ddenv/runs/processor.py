@@ -99,7 +99,9 @@ def _groups(controller: str, new: tuple[str, ...], old: tuple[str, ...]) -> Iter
 
 def _number(text: str) -> float:
     """Infinite for no limit."""
-    return float(text) if text.isdecimal() and int(text) > 0 else math.inf
+    if text.isdecimal() and int(text) > 0:
+        return float(text)
+    return math.inf
 
 
 def _text(file: Path | str) -> str:

@@ -147,7 +147,9 @@ def no_reasons(certificate: Certificate) -> str:
 
 
 def _kind(test: Test) -> str:
-    return test.outcome if test.outcome in (F, GOAL) else test.failure
+    if test.outcome in (F, GOAL):
+        return test.outcome
+    return test.failure
 
 
 def _end(kind: str, tests: Sequence[Test]) -> End:
@@ -216,11 +218,10 @@ def parted(first: array[float], second: array[float]) -> tuple[float, float | No
 
 def sentence(reason: Reason) -> str:
     """What happens without the models, in one sentence, from the runs that show it."""
-    others = (
-        f" and what rests on it ({count(len(reason.gone) - 1, 'model')})"
-        if len(reason.gone) > 1
-        else ""
-    )
+    if len(reason.gone) > 1:
+        others = f" and what rests on it ({count(len(reason.gone) - 1, 'model')})"
+    else:
+        others = ""
     without = f"Without {reason.without}{others}"
     kind = "chosen run" if reason.exact else "fresh run"
     if not reason.ends:
@@ -257,7 +258,9 @@ def parting_words(one: Parting | None, lacks: str, met: str, it: str = "it") -> 
     known; then a sentence that begins with `met`, if the robot met `it`.
     """
     if one is None:
-        return f"Where the paths diverge is not known: {lacks}." if lacks else ""
+        if lacks:
+            return f"Where the paths diverge is not known: {lacks}."
+        return ""
     if one.apart is None or one.place is None:
         # Their ways may be equal to the end.
         equal = f" equal until {one.equal:.1f} s, and" if one.equal else ""

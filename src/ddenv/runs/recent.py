@@ -42,20 +42,26 @@ class Recent:
 
     @property
     def sign(self) -> str:
-        return "✗" if self.trouble else STATUS.get(self.status, ("·", ""))[0]
+        if self.trouble:
+            return "✗"
+        return STATUS.get(self.status, ("·", ""))[0]
 
     @property
     def state_words(self) -> str:
         if self.trouble:
             return "cannot be read"
         if self.status == "finished":
-            return "minimal" if self.minimal else "finished"
+            if self.minimal:
+                return "minimal"
+            return "finished"
         return STATUS.get(self.status, ("", self.status or "..."))[1]
 
     @property
     def brief(self) -> str:
         """How many models are left, for a list in which its sign is its state."""
-        return f"{len(self.kept)}/{self.total}" if self.total else ""
+        if self.total:
+            return f"{len(self.kept)}/{self.total}"
+        return ""
 
     @property
     def is_worked_on(self) -> bool:

@@ -201,7 +201,9 @@ def with_remembered(world: Path, reading: Reading, announce: Announce | None = N
             f"uses what you chose for {names}; {state_file(REMEDIES)} keeps that, "
             "--no-remembered leaves it out"
         )
-    return read_as if found else reading
+    if found:
+        return read_as
+    return reading
 
 
 def without_guesses_at_start(scenario: Scenario, announce: Announce | None = None) -> Scenario:

@@ -91,7 +91,9 @@ def left_said(state: RunState, at_work: bool) -> Sentences:
     """
     left = remaining(state, at_work)
     if left is None:
-        return ("more tests than forecast", "") if _is_overdue(state) else ()
+        if _is_overdue(state):
+            return ("more tests than forecast", "")
+        return ()
     low, likely, high = map(rounded, left.tests)
     words = f"about {count(likely, 'test')} left"
     time = [] if left.seconds is None else [about(left.seconds[1])]
@@ -124,11 +126,9 @@ def _expected(state: RunState) -> Expected | None:
         return None
     if state.confirming:
         now = in_the_making(state)
-        return (
-            None
-            if now is None
-            else _after(expected_fresh_runs(state, now), fresh_runs_made(state, now))
-        )
+        if now is None:
+            return None
+        return _after(expected_fresh_runs(state, now), fresh_runs_made(state, now))
     if forecast is None or baseline is None:
         return None
     left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
@@ -158,11 +158,10 @@ def search_tests(models: int, asked: Reduction, rate: float | None = None) -> Ex
     runs = {"first": 1 + asked.iterations, "exact": asked.exact_seeds}.get(
         asked.accept_rate, min(1 + asked.iterations, FEWEST_MISSES)
     )
-    key = (
-        "ddenv as printed"
-        if asked.algorithm == "ddenv" and asked.growth == "paper"
-        else asked.algorithm
-    )
+    if asked.algorithm == "ddenv" and asked.growth == "paper":
+        key = "ddenv as printed"
+    else:
+        key = asked.algorithm
     factor, power = SCALE.get(key, SCALE["ddenv"])
     likely = factor * models**power * (1 + RERUN * (runs - 1))
     # A few models make few different candidates.

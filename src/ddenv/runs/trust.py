@@ -127,7 +127,9 @@ def _program(words: str, files: Iterable[Path]) -> Program:
 def untrusted(scenario: Scenario) -> Program | None:
     """The program that tests of `scenario` start, if the user has not trusted it as it is now."""
     program = program_of(scenario)
-    return None if program is None or _trusted().issuperset(program.digests) else program
+    if program is None or _trusted().issuperset(program.digests):
+        return None
+    return program
 
 
 def trust(program: Program) -> None:
@@ -245,4 +247,6 @@ def made_here(scenario: Scenario) -> Scenario:
 def hosts_of(cluster: str) -> list[str]:
     """The hosts of `ssh:HOST1,HOST2`; none for any other cluster."""
     hosts = cluster.removeprefix(SSH).split(",") if cluster.startswith(SSH) else []
-    return hosts if all(re.fullmatch(r"\w[\w.-]*", host) for host in hosts) else []
+    if all(re.fullmatch(r"\w[\w.-]*", host) for host in hosts):
+        return hosts
+    return []

@@ -158,11 +158,9 @@ class Scenery:
     def ghost_of(self, model: Model) -> list[bytes]:
         """The messages that draw a model, as the ghost sees it, for one browser."""
         surface = merge([replace(one, tints=None, alpha=1.0) for one in paint(model)])
-        return (
-            [self._stage.drawn((*GHOST_TRAIL, "model"), plain(surface, colors.GHOST))]
-            if len(surface.faces)
-            else []
-        )
+        if len(surface.faces):
+            return [self._stage.drawn((*GHOST_TRAIL, "model"), plain(surface, colors.GHOST))]
+        return []
 
     def still(self, shot: Shot) -> list[bytes]:
         """The messages that show the environment of `shot` in one browser, but for elements that
@@ -225,7 +223,9 @@ class Scenery:
     def _tube(self, points: np.ndarray, color: Color) -> Object | None:
         """A drawn trajectory; None for one without length."""
         tube = mesh.tube(points, self.scale * LINE)
-        return plain(tube, color, glow=0.4) if len(tube.faces) else None
+        if len(tube.faces):
+            return plain(tube, color, glow=0.4)
+        return None
 
     def _draw_model(self, number: int, model: Model, element: bool) -> Surface:
         painted = paint(model)
@@ -300,7 +300,9 @@ def _height_of(plane: Pose, x: float, y: float) -> float | None:
     """The height of `plane` at (x, y), m; None if it is vertical."""
     a, b, c = plane.rotate((0.0, 0.0, 1.0))
     px, py, pz = plane.position
-    return pz - (a * (x - px) + b * (y - py)) / c if abs(c) > STEEP else None
+    if abs(c) > STEEP:
+        return pz - (a * (x - px) + b * (y - py)) / c
+    return None
 
 
 # What stands in a ring.

@@ -258,7 +258,9 @@ def height_at(surface: Surface, x: float, y: float) -> float | None:
     v = cross(first, place) / area
     inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
     heights = (origin[:, 2] + u * first[:, 2] + v * second[:, 2])[inside]
-    return float(heights.max()) if len(heights) else None
+    if len(heights):
+        return float(heights.max())
+    return None
 
 
 def _sheet(rows: int, columns: int) -> np.ndarray:

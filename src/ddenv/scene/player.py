@@ -169,7 +169,9 @@ class Player:
         # The path of the evidence is drawn anyway.
         hidden = what == "way" and test == self._evidence
         way = self._scenery.way(rows[:0] if hidden else rows, what == "ghost-way")
-        return [way, *self._moved(test)] if what == "ghost-way" and test < 0 else [way]
+        if what == "ghost-way" and test < 0:
+            return [way, *self._moved(test)]
+        return [way]
 
     def _moved(self, number: int) -> list[bytes]:
         """The messages that draw where the changed model stands in a run with a changed number."""
@@ -179,7 +181,9 @@ class Player:
         if owner not in self._elements:
             return []
         after = changed(scenario, world, {one.name: one.value})[1].model(owner)
-        return [] if after == world.model(owner) else self._scenery.ghost_of(after)
+        if after == world.model(owner):
+            return []
+        return self._scenery.ghost_of(after)
 
     def _shot_of(self, test: int) -> Shot:
         """A finished test as it was made: in the environment of that moment. Raises UserError."""
@@ -197,17 +201,17 @@ class Player:
         """
         # A killed engine leaves its rows behind. Read rows before events, so that their tests are
         # known.
-        self._live = (
-            self._run.live() if self._wanted.at is None and engine_is_alive(self._run.path) else []
-        )
+        if self._wanted.at is None and engine_is_alive(self._run.path):
+            self._live = self._run.live()
+        else:
+            self._live = []
         self._position.catch_up()
         row = made_for(self._state, self._wanted)
         idle = now - self._ran_at
-        following = (
-            shot_of(self._state, row, self._live)
-            if row
-            else shot(self._state, self._live, self._shot, idle)
-        )
+        if row:
+            following = shot_of(self._state, row, self._live)
+        else:
+            following = shot(self._state, self._live, self._shot, idle)
         if any(row.test == following.test for row in self._live):
             self._ran_at = now
         if self._state.evidence_test != self._evidence:
@@ -281,11 +285,9 @@ class Player:
 
 
 def _numbers(one: Parting) -> str:
-    return (
-        f"tests {one.with_test} and {one.without_test}"
-        if one.without_test > 0
-        else f"test {one.with_test}"
-    )
+    if one.without_test > 0:
+        return f"tests {one.with_test} and {one.without_test}"
+    return f"test {one.with_test}"
 
 
 def _row(time: float, pose: Pose) -> list[float]:

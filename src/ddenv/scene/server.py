@@ -267,7 +267,9 @@ def remember(run: Path, port: int, token: str) -> None:
 
 def _known() -> dict[str, object]:
     known = read_state(FILE)
-    return known if isinstance(known, dict) else {}
+    if isinstance(known, dict):
+        return known
+    return {}
 
 
 def name_of(token: str) -> str:

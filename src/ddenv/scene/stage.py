@@ -82,9 +82,10 @@ class Stage:
         """The message that draws `thing` at `path`, or None deletes what is there, for one browser
         alone: it is not kept.
         """
-        command = (
-            {"type": "delete"} if thing is None else {"type": "set_object", "object": thing.lower()}
-        )
+        if thing is None:
+            command = {"type": "delete"}
+        else:
+            command = {"type": "set_object", "object": thing.lower()}
         return bytes(umsgpack.packb(command | {"path": _text(path)}))
 
     def messages(self) -> list[bytes]:

@@ -74,11 +74,9 @@ class Wheels:
         """How far left and right wheels have turned at each row of a motion, shape (N, 2), rad; see
         `rolled`.
         """
-        return (
-            np.zeros((len(rows), 2))
-            if self._drive is None
-            else rolled(self._robot, self._drive, self._skid, rows)
-        )
+        if self._drive is None:
+            return np.zeros((len(rows), 2))
+        return rolled(self._robot, self._drive, self._skid, rows)
 
     def data(self) -> list[Data]:
         return [{"key": each.key, "axis": list(each.axis), "side": each.side} for each in self.all]

@@ -283,4 +283,6 @@ def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
     if interrupted:
         print("interrupted; the same command continues", file=sys.stderr)
         return 130
-    return 0 if minimal == len(results) else 1
+    if minimal == len(results):
+        return 0
+    return 1

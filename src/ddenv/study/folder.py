@@ -94,4 +94,6 @@ def machine() -> str:
     """The processor, its cores and the system."""
     cores = count(processor.usable_cores(), "core")
     name = processor.name()[:LONGEST_NAME]
-    return f"{name}, {cores}, {platform.system()}" if name else cores
+    if name:
+        return f"{name}, {cores}, {platform.system()}"
+    return cores

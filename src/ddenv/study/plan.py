@@ -67,7 +67,9 @@ class Method:
     def label(self) -> str:
         """In short: the pair of `ddenv`, or the algorithm's name with the parts that it uses."""
         words = "/".join(self.used)
-        return words if self.algorithm == "ddenv" else f"{self.algorithm} {words}".strip()
+        if self.algorithm == "ddenv":
+            return words
+        return f"{self.algorithm} {words}".strip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +189,9 @@ def scenario_names(words: Sequence[str]) -> Names:
     """The names or files of the scenarios, each once; the paper's three if none is given. Raises
     UserError.
     """
-    return _names("--scenarios", ",".join(words)) if words else SCENARIOS
+    if words:
+        return _names("--scenarios", ",".join(words))
+    return SCENARIOS
 
 
 def _names(option: str, words: str) -> Names:

@@ -49,9 +49,9 @@ def difference(file: RunFile, cell: Cell) -> str:
         return "another scenario, or with other options"
     if file.document("world") != read_bytes(cell.scenario.world):
         return "another world"
-    return (
-        "" if file.document("robot") == read_bytes(cell.scenario.robot.model) else "another robot"
-    )
+    if file.document("robot") == read_bytes(cell.scenario.robot.model):
+        return ""
+    return "another robot"
 
 
 def _compared(scenario: object) -> object:
@@ -114,7 +114,9 @@ class Result:
     @property
     def smaller(self) -> float:
         """The share of the models that was removed."""
-        return 1 - len(self.left) / len(self.elements) if self.elements else 0.0
+        if self.elements:
+            return 1 - len(self.left) / len(self.elements)
+        return 0.0
 
     @property
     def bound(self) -> int:
@@ -140,7 +142,9 @@ def read_cell(folder: Path, cell: Cell) -> Result:
             other = difference(file, cell)
     except UserError as error:
         return Result(cell=cell, problem=str(error))
-    return Result(cell=cell, problem=f"its run was made with {other}") if other else result
+    if other:
+        return Result(cell=cell, problem=f"its run was made with {other}")
+    return result
 
 
 def _read(file: RunFile, cell: Cell) -> Result:
@@ -171,13 +175,12 @@ def _read(file: RunFile, cell: Cell) -> Result:
     tests, fresh_tests = ([state.test(number) for number in numbers] for numbers in (search, fresh))
     certificate = current(state) if state.status == "finished" else None
     minimal = state.minimal and certificate is not None and is_minimal(certificate)
-    problem = (
-        "it has no certificate"
-        if state.minimal
-        else state.reason
-        if state.ended
-        else "has not ended"
-    )
+    if state.minimal:
+        problem = "it has no certificate"
+    elif state.ended:
+        problem = state.reason
+    else:
+        problem = "has not ended"
     # A certificate runs the whole world only where what is left missed f: its runs would show the
     # rate as too low.
     whole = [
@@ -232,11 +235,9 @@ def paper_row(cell: Cell) -> Paper | None:
     """The paper's numbers for a cell; None if it has none. It knows no slices."""
     table = TABLES.get(cell.scenario.name, {"rows": {}})
     row = table["rows"].get(cell.method.pair)
-    return (
-        Paper(table["table"], **row)
-        if row and cell.method.algorithm == "ddenv" and not cell.slices
-        else None
-    )
+    if row and cell.method.algorithm == "ddenv" and not cell.slices:
+        return Paper(table["table"], **row)
+    return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,19 +275,25 @@ class Row:
         """The minimum of tests for any method to find this result, the median of the seeds; None if
         nothing is minimal.
         """
-        return median(result.bound for result in self.minimal) if self.minimal else None
+        if self.minimal:
+            return median(result.bound for result in self.minimal)
+        return None
 
     @property
     def tests(self) -> float | None:
         """Their median, without those of certificates; None if nothing is minimal."""
-        return median(result.tests for result in self.minimal) if self.minimal else None
+        if self.minimal:
+            return median(result.tests for result in self.minimal)
+        return None
 
     @property
     def certain(self) -> float | None:
         """The tests of a method that is certified with all seeds; None for another, which is no
         success.
         """
-        return self.tests if self.certified else None
+        if self.certified:
+            return self.tests
+        return None
 
 
 def rows_of(plan: Plan, results: Sequence[Result]) -> tuple[tuple[Row, ...], ...]:
@@ -314,4 +321,6 @@ def spread(values: Sequence[float], said: Callable[[float], str]) -> str:
     low = said(min(values))
     high = said(max(values))
     middle = said(median(values))
-    return middle if low == high else f"{middle} ({low} to {high})"
+    if low == high:
+        return middle
+    return f"{middle} ({low} to {high})"

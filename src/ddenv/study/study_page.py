@@ -74,11 +74,10 @@ def content(
     figures = [(f"{len(minimal)} of {len(results)}", "certified")]
     if minimal:
         smaller = percent(mean(result.smaller for result in minimal))
-        worlds = (
-            "Every world is"
-            if len(minimal) == len(results)
-            else f"{len(minimal)} of {len(results)} worlds are"
-        )
+        if len(minimal) == len(results):
+            worlds = "Every world is"
+        else:
+            worlds = f"{len(minimal)} of {len(results)} worlds are"
         verdict = f"{worlds} minimal: {smaller} smaller on average"
         figures.append((smaller, "smaller, mean"))
     figures += [

@@ -138,9 +138,10 @@ def worlds(folder: Path, rows: Sequence[Row], file: str) -> Iterator[Block]:
     for number, (left, results) in enumerate(ranked[:MOST_WORLDS], start=1):
         minimal = any(result.minimal for result in results)
         what = "The minimal world" if minimal else "What is left, not shown to be minimal"
-        of_them = (
-            f", the end of {len(results)} of {len(over(rows))} cells" if len(over(rows)) > 1 else ""
-        )
+        if len(over(rows)) > 1:
+            of_them = f", the end of {len(results)} of {len(over(rows))} cells"
+        else:
+            of_them = ""
         these = named(left, MOST_LEFT) or ("nothing that can be removed",)
         yield say(f"{what} (the paper's Figure 3){of_them}: ", *these, ".")
         yield _map(
@@ -225,7 +226,9 @@ def _numbers(row: Row, beside: bool, slices: bool) -> Iterator[tuple[str, Cell]]
 
 
 def _whole(value: float) -> str:
-    return f"{value:.0f}" if value == int(value) else f"{value:.1f}"
+    if value == int(value):
+        return f"{value:.0f}"
+    return f"{value:.1f}"
 
 
 def behind(rows: Sequence[Row]) -> Table:
@@ -332,7 +335,11 @@ def best(scenarios: Sequence[Sequence[Row]]) -> Section | None:
 
 def _cell(row: Row, fewest: float | None) -> Cell:
     if row.tests is None:
-        return "not certified" if any(result.elements for result in row.results) else "not made yet"
+        if any(result.elements for result in row.results):
+            return "not certified"
+        return "not made yet"
     if not row.certified:
         return f"{row.tests:g} ({len(row.minimal)} of {len(row.results)} certified)"
-    return Strong(f"{row.tests:g} ◂") if row.tests == fewest else f"{row.tests:g}"
+    if row.tests == fewest:
+        return Strong(f"{row.tests:g} ◂")
+    return f"{row.tests:g}"

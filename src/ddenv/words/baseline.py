@@ -61,9 +61,10 @@ def missed(state: RunState) -> str:
     middle, most = (percent(miss_chance(rate, asked.iterations)) for rate in (base.rate, base.low))
     chance = middle if middle == most else f"{middle} (at most {most})"
     rare = base.iterations_95 > asked.iterations
-    enough = (
-        f"; for a 95 % chance of seeing f, use --iterations {base.iterations_95}" if rare else ""
-    )
+    if rare:
+        enough = f"; for a 95 % chance of seeing f, use --iterations {base.iterations_95}"
+    else:
+        enough = ""
     return (
         f"the chance that {count(1 + asked.iterations, 'run')} of a candidate miss f is "
         f"{chance}{enough}"

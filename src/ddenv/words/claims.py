@@ -77,11 +77,10 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     one = f"{'other ' if pinned else ''}{each}"
     without = f"any one of these {len(removals)}" if len(removals) > 1 else removals[0].without
     bound = _at_most(certificate)
-    often = (
-        rate(most)
-        if bound is None
-        else f"{_seldom(removals)} (upper bound: {percent_at_most(bound)} as often)"
-    )
+    if bound is None:
+        often = rate(most)
+    else:
+        often = f"{_seldom(removals)} (upper bound: {percent_at_most(bound)} as often)"
     return f"no {one} can be removed: {kept(certificate)}; without {without}, {often}{but}"
 
 
@@ -156,7 +155,9 @@ def _kept(certificate: Certificate) -> float:
     asked for.
     """
     bound = certificate.claims[0].bound
-    return certificate.certify_rate if bound is None else bound
+    if bound is None:
+        return certificate.certify_rate
+    return bound
 
 
 def _at_most(certificate: Certificate) -> float | None:
@@ -164,15 +165,15 @@ def _at_most(certificate: Certificate) -> float | None:
     if that was not bounded.
     """
     bounds = [claim.bound for claim in certificate.claims if claim.without is not None]
-    return (
-        max((bound for bound in bounds if bound is not None), default=None)
-        if None not in bounds
-        else None
-    )
+    if None not in bounds:
+        return max((bound for bound in bounds if bound is not None), default=None)
+    return None
 
 
 def _as_often(bound: float | None) -> str:
-    return "rarer" if bound is None else f"at most {percent_at_most(bound)} as often"
+    if bound is None:
+        return "rarer"
+    return f"at most {percent_at_most(bound)} as often"
 
 
 def shown(state: RunState) -> str:
@@ -208,22 +209,24 @@ def uncertified(state: RunState, run: object) -> str:
 
 
 def _stayed(pinned: int) -> str:
-    return (
-        "1 pinned model was never left out"
-        if pinned == 1
-        else f"{pinned} pinned models were never left out"
-    )
+    if pinned == 1:
+        return "1 pinned model was never left out"
+    return f"{pinned} pinned models were never left out"
 
 
 def environment_named(node: int) -> str:
-    return "the whole world" if node == 0 else f"the environment of step {node}"
+    if node == 0:
+        return "the whole world"
+    return f"the environment of step {node}"
 
 
 def what_ran(one: FreshRuns) -> str:
     """What was run with fresh seeds: "what is left", "without crate_00" or "the whole world"."""
     if one.without is not None:
         return f"without {one.without}"
-    return "what is left" if one.is_left else environment_named(one.node)
+    if one.is_left:
+        return "what is left"
+    return environment_named(one.node)
 
 
 def rate(fresh: Claim | FreshRuns) -> str:
@@ -322,7 +325,9 @@ def means(state: RunState, certificate: Certificate, claim: Claim) -> str:
     then fails otherwise.
     """
     other = instead(state, certificate, claim)
-    return f"{meaning(claim, certificate)}; {other}" if other else meaning(claim, certificate)
+    if other:
+        return f"{meaning(claim, certificate)}; {other}"
+    return meaning(claim, certificate)
 
 
 def meaning(claim: Claim, certificate: Certificate) -> str:
@@ -356,7 +361,9 @@ def meaning(claim: Claim, certificate: Certificate) -> str:
 
 def _whole_rate(certificate: Certificate) -> str:
     """The rate that what is left has to keep a part of."""
-    return "the rate at the start of its branch" if certificate.branch else "the whole world's rate"
+    if certificate.branch:
+        return "the rate at the start of its branch"
+    return "the whole world's rate"
 
 
 def of_passing(state: RunState, one: Isolation) -> str:
@@ -401,9 +408,10 @@ def of_passing(state: RunState, one: Isolation) -> str:
 
 
 def _reaching(one: Isolation, claim: Returned) -> str:
-    chosen = (
-        f"each of {count(len(one.asked.chosen), 'chosen run')} and in " if one.asked.chosen else ""
-    )
+    if one.asked.chosen:
+        chosen = f"each of {count(len(one.asked.chosen), 'chosen run')} and in "
+    else:
+        chosen = ""
     return f"the robot reaches its goal in {chosen}{_share(claim.reached, claim)}"
 
 
@@ -488,7 +496,9 @@ def promise(state: RunState, certificate: Certificate) -> str:
 
 
 def _any_one(pinned: int) -> str:
-    return f"any one model that is not pinned ({_stayed(pinned)})" if pinned else "any one model"
+    if pinned:
+        return f"any one model that is not pinned ({_stayed(pinned)})"
+    return "any one model"
 
 
 def ended(state: RunState) -> str:
@@ -533,11 +543,9 @@ def missing(state: RunState) -> str:
     """Why the current environment has no finished certificate; "" if it has one."""
     if current(state) is not None:
         return ""
-    return (
-        "no fresh runs were made"
-        if state.certificate is None
-        else "its certificate is not finished"
-    )
+    if state.certificate is None:
+        return "no fresh runs were made"
+    return "its certificate is not finished"
 
 
 def drift(state: RunState) -> Sentences:
@@ -566,7 +574,9 @@ def drift(state: RunState) -> Sentences:
 
 def seen(node: Node) -> str:
     """How often f showed in an environment, from all runs so far; "" without runs."""
-    return f"{node.shown} of {len(node.runs)}" if node.runs else ""
+    if node.runs:
+        return f"{node.shown} of {len(node.runs)}"
+    return ""
 
 
 def of_runs(shown: int, runs: int) -> str:

@@ -19,13 +19,17 @@ _OFF = "from here on all tests run to their end"
 
 def ended_early(test: Test) -> str:
     """That a test ended early, and when (simulated s); "" if it did not."""
-    return f"ended early at {test.simulated_seconds:.1f} s" if test.cut else ""
+    if test.cut:
+        return f"ended early at {test.simulated_seconds:.1f} s"
+    return ""
 
 
 def early_among(tests: Iterable[Test]) -> str:
     """How many of some tests ended early, such as "4 early"; "" if none did."""
     early = sum(test.cut for test in tests)
-    return f"{early} early" if early else ""
+    if early:
+        return f"{early} early"
+    return ""
 
 
 def why_off(state: RunState) -> str:

@@ -253,22 +253,20 @@ def _standing(state: RunState, status: str) -> Sentences:
                 "Everything so far is kept; r tries again.",
             )
         case "stopped":
-            said = (
-                reason
-                if reason.startswith("stopped")
-                else f"stopped: {reason}"
-                if reason
-                else "stopped"
-            )
+            if reason.startswith("stopped"):
+                said = reason
+            elif reason:
+                said = f"stopped: {reason}"
+            else:
+                said = "stopped"
             then = _out_of_budget(state) or ("Everything so far is kept; r resumes.",)
             return (f"The engine was {said}.", *then)
         case "lost":
             unfinished = state.tally["running"]
-            lost = (
-                f" Only {count(unfinished, 'unfinished test')} must run again."
-                if unfinished
-                else ""
-            )
+            if unfinished:
+                lost = f" Only {count(unfinished, 'unfinished test')} must run again."
+            else:
+                lost = ""
             return (
                 (
                     "The engine is not running: it was killed, or its machine went down. r "
@@ -325,7 +323,9 @@ def _between(snapshot: Snapshot, options: Settings) -> Sentences:
     if arrived := _arrival(state):
         return (arrived, first)
     then = baseline(state) if state.round is None else follows(options, state.round)
-    return (first, then) if then else (first,)
+    if then:
+        return (first, then)
+    return (first,)
 
 
 def _ended(state: RunState, candidate: Candidate, options: Settings) -> str:
@@ -450,18 +450,19 @@ def _shown_of(state: RunState, candidate: Candidate) -> str:
     """
     _, shown = seen(state.tests, candidate.tests)
     done = sum(test.is_finished for test in state.tests_of(candidate.tests))
-    return f"f showed in {of_runs(shown, done)} so far" if shown else ""
+    if shown:
+        return f"f showed in {of_runs(shown, done)} so far"
+    return ""
 
 
 def _why_again(before: Test | None) -> str:
     if before is None:
         return "another seed is tried at the same time."
     away = metres(before.distance)
-    how = (
-        f"{'' if before.failure in DEEDS else ' elsewhere,'} {away} from f's end"
-        if away
-        else ", but not as in f"
-    )
+    if away:
+        how = f"{'' if before.failure in DEEDS else ' elsewhere,'} {away} from f's end"
+    else:
+        how = ", but not as in f"
     reasons = {
         "pass": "the goal was reached.",
         "other": f"the robot {deed(before.failure)}{how}.",
@@ -479,11 +480,9 @@ def _finished(state: RunState) -> Happening:
     if not state.certified:
         left = f"{kept} left: {first_of([plain(name) for name in state.environment], NAMED)}."
         helps = () if (found := current(state)) is None else only_helping(found)
-        out = (
-            (f"{plain(helps[0])} only helps: press H to leave it out and search again.",)
-            if helps
-            else ()
-        )
+        out: tuple[str, ...] = ()
+        if helps:
+            out = (f"{plain(helps[0])} only helps: press H to leave it out and search again.",)
         return "returned", (
             _reason(state, "The run ended early."),
             *out,
@@ -499,11 +498,9 @@ def _finished(state: RunState) -> Happening:
     stays = ("p unpins.",) if state.pinned.intersection(state.environment) else ()
     certificate = current(state)
     means = () if certificate is None else (as_sentence(promise(state, certificate)),)
-    passing = (
-        ()
-        if state.isolated is None
-        else (f"{as_sentence(plain(of_passing(state, state.isolated)))} W shows it.",)
-    )
+    passing: tuple[str, ...] = ()
+    if state.isolated is not None:
+        passing = (f"{as_sentence(plain(of_passing(state, state.isolated)))} W shows it.",)
     return "returned", (
         *passing,
         f"Minimal: {kept} left. {_reason(state, '')}",
@@ -634,9 +631,10 @@ def _now(snapshot: Snapshot, certificate: Certificate) -> Sentences:
     if not running:
         return ()
     test = running[0]
-    what = (
-        "everything that is left" if test.node == certificate.node else environment_named(test.node)
-    )
+    if test.node == certificate.node:
+        what = "everything that is left"
+    else:
+        what = environment_named(test.node)
     if test.without is not None:
         what = f"everything that is left except {plain(test.without)}"
     return (f"Now: run {test.run - certificate.first_run + 1} of {what}.",)

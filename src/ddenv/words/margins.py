@@ -66,11 +66,9 @@ def rows(margins: Margins) -> tuple[Row, ...]:
 
 
 def _end(side: Side) -> str:
-    return (
-        " (end)"
-        if side.gone is None and side.until is not None and side.until.value == side.end
-        else ""
-    )
+    if side.gone is None and side.until is not None and side.until.value == side.end:
+        return " (end)"
+    return ""
 
 
 def _from(side: Side) -> str:
@@ -102,11 +100,10 @@ def _said(side: Side) -> str:
     elif side.gone is not None and side.gone.verdict == "other":
         words.append(f"no f at {_in(side.gone, 'similar')}, where the robot {_instead(side.gone)}")
     if side.goal is not None:
-        to_end = (
-            f", and beyond at all values tried, to the end of its range ({side.end:.4g})"
-            if side.to_end
-            else ""
-        )
+        if side.to_end:
+            to_end = f", and beyond at all values tried, to the end of its range ({side.end:.4g})"
+        else:
+            to_end = ""
         words.append(f"the robot reaches its goal at {_in(side.goal, 'pass')}{to_end}")
     if side.again is not None:
         words.append(f"f again at {_in(side.again, 'similar')}")
@@ -164,11 +161,10 @@ def nearest_fix(margins: Margins) -> str:
 
 
 def sureness(margins: Margins) -> str:
-    less = (
-        ""
-        if margins.asked.certified
-        else " No certificate has shown yet how often f shows in what is left."
-    )
+    if margins.asked.certified:
+        less = ""
+    else:
+        less = " No certificate has shown yet how often f shows in what is left."
     return (
         "Claims hold for the values tried, not for those in between; the chance that any claim "
         "of a call is wrong is at most "
@@ -240,7 +236,9 @@ def ran(_: RunState, after: RunState) -> str:
     if last.run >= FIRST_FIX_RUN:
         fixes = {(one.name, one.value): one for one in fixes_of(after.margins)}
         known = fixes.get((last.name, last.value))
-        return "" if known is None or known.confirmed is None else f"  {nearest_fix(after.margins)}"
+        if known is None or known.confirmed is None:
+            return ""
+        return f"  {nearest_fix(after.margins)}"
     one = next(one for one in margins_of(after.margins) if one.asked.name == last.name)
     value = next(each for side in one.sides for each in side.tried if each.value == last.value)
     if not value.verdict:

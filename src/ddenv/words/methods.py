@@ -199,11 +199,9 @@ def follows(options: Settings, last: Round) -> str:
     if last.winner is not None or any(one.verdict in ("", "similar") for one in last.candidates):
         return ""
     reason = "No candidate showed f in the last round"
-    return (
-        f"{reason}, so {SMALLER[options.algorithm]}."
-        if options.algorithm in SMALLER
-        else f"{reason}."
-    )
+    if options.algorithm in SMALLER:
+        return f"{reason}, so {SMALLER[options.algorithm]}."
+    return f"{reason}."
 
 
 def fruitless(options: Settings, current: Round, models: int) -> str:

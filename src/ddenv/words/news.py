@@ -52,18 +52,18 @@ def headline(state: RunState, simulated: float | None = None) -> str:
 def _where(state: RunState) -> str:
     if state.confirming and not state.ended:
         now = in_the_making(state)
-        return CONFIRMING if now is None else f"certificate: {made_of_usual(state, now)}"
+        if now is None:
+            return CONFIRMING
+        return f"certificate: {made_of_usual(state, now)}"
     if state.settling and not state.ended:
         return SETTLING
     if state.isolating is not None and not state.ended:
         return isolating(state)
     if state.margining is not None and not state.ended:
         return margins.finding(state)
-    return (
-        "baseline"
-        if state.round is None
-        else f"round {state.round.number}, n {state.round.n_partitions}"
-    )
+    if state.round is None:
+        return "baseline"
+    return f"round {state.round.number}, n {state.round.n_partitions}"
 
 
 def isolating(state: RunState) -> str:
@@ -74,9 +74,10 @@ def isolating(state: RunState) -> str:
     if last is None or now is None:
         return ISOLATING
     gone = state.removals[last - 1].models
-    tried = (
-        f"without {count(len(gone), 'model')}" if gone else "whether the whole world still fails"
-    )
+    if gone:
+        tried = f"without {count(len(gone), 'model')}"
+    else:
+        tried = "whether the whole world still fails"
     made = sum(
         test.run >= now.asked.run and test.is_finished
         for test in state.tests
@@ -93,12 +94,13 @@ def news(kind: str, before: RunState, after: RunState, attached: bool = False) -
         line = NEWS[kind](before, after)
     else:
         # All other decisions of the user carry their own words.
-        line = (
-            after.decisions[-1].words
-            if len(after.decisions) > len(before.decisions)
-            else SAID.get(kind, "")
-        )
-    return line if attached or not line else f"{line}{HINTS.get(kind, '')}"
+        if len(after.decisions) > len(before.decisions):
+            line = after.decisions[-1].words
+        else:
+            line = SAID.get(kind, "")
+    if attached or not line:
+        return line
+    return f"{line}{HINTS.get(kind, '')}"
 
 
 def _engine_started(before: RunState, after: RunState) -> str:
@@ -130,18 +132,19 @@ def _disk_space(before: RunState, after: RunState) -> str:
                 "limit is raised"
             )
         return f"  out of disk space: waiting until {after.needs_room / 1e6:.0f} MB are free"
-    return "  there is disk space again" if before.needs_room else ""
+    if before.needs_room:
+        return "  there is disk space again"
+    return ""
 
 
 def _supports(_: RunState, after: RunState) -> str:
     if after.unsettled:
         return f"it is unknown which models support others: {after.unsettled}"
     resting = len({upper for upper, _ in after.supports})
-    return (
-        f"{count(resting, 'model')} of the world {'rests' if resting == 1 else 'rest'} on others"
-        if resting
-        else ""
-    )
+    if resting:
+        rests = "rests" if resting == 1 else "rest"
+        return f"{count(resting, 'model')} of the world {rests} on others"
+    return ""
 
 
 def _round_started(_: RunState, after: RunState) -> str:
@@ -175,11 +178,10 @@ def _judged(state: RunState, judged: Iterable[Candidate | Trial | Removal]) -> s
         endings = Counter(
             _ending(state, test) for test in state.tests_of(one.tests) if test.is_finished
         )
-        ways = (
-            f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})"
-            if endings
-            else ""
-        )
+        if endings:
+            ways = f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})"
+        else:
+            ways = ""
         implied = f", {words}" if (words := implied_words(state, one.tests)) else ""
         early = f", {words}" if (words := early_among(state.tests_of(one.tests))) else ""
         said.append(

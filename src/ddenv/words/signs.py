@@ -87,13 +87,17 @@ def signs(counts: Mapping[str, int]) -> str:
     """How tests ended, in signs with their counts, from the number of each outcome."""
     said = [f"{counts[name]}{OUTCOME[name][0]}" for name in _SIGNED if counts.get(name)]
     spaced = " ".join(said)
-    return spaced if len(spaced) < 9 else "".join(said)
+    if len(spaced) < 9:
+        return spaced
+    return "".join(said)
 
 
 def outcome(test: Test) -> str:
     """How a test ended, with the kind of failure if known."""
     words = OUTCOME.get(test.outcome, "")
-    return f"{words[0]} {test.failure}" if words and test.failure in DEEDS else words
+    if words and test.failure in DEEDS:
+        return f"{words[0]} {test.failure}"
+    return words
 
 
 def brief(seconds: float) -> str:
@@ -102,14 +106,18 @@ def brief(seconds: float) -> str:
         return f"{seconds:.1f} s"
     if seconds < 599.5:
         return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 36_000 else f"{seconds / 3600:.0f} h"
+    if seconds < 36_000:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.0f} h"
 
 
 def simulated(seconds: float | None, timeout: float) -> str:
     """How far a running test is, in simulated time, marked so that it is not taken for real
     time.
     """
-    return "" if seconds is None else f" {seconds:.1f}/{timeout:g} s"
+    if seconds is None:
+        return ""
+    return f" {seconds:.1f}/{timeout:g} s"
 
 
 def metres(value: Any, digits: int = 1) -> str:
@@ -122,4 +130,6 @@ def metres(value: Any, digits: int = 1) -> str:
 def dropping(names: Sequence[str], width: int) -> str:
     """That models drop, the first one by a name of at most `width` cells; "" for none."""
     more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-    return f"drops {shortened(names[0], width)}{more}" if names else ""
+    if names:
+        return f"drops {shortened(names[0], width)}{more}"
+    return ""

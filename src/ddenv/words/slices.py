@@ -49,11 +49,9 @@ def slice_in_short(state: RunState, node: Node) -> str:
 
 def _chance(met: list[Environment]) -> str:
     chance = fresh_chance(met)
-    return (
-        f"about {percent(chance)}"
-        if chance
-        else f"probably below {percent(min(1.0, RARE / len(met)))}"
-    )
+    if chance:
+        return f"about {percent(chance)}"
+    return f"probably below {percent(min(1.0, RARE / len(met)))}"
 
 
 def refuted_words(state: RunState) -> str:
@@ -74,6 +72,6 @@ def implied_words(state: RunState, tests: Iterable[int]) -> str:
     """
     found = dict.fromkeys(test.implied_by for test in state.tests_of(tests))
     sources = [str(one) for one in found if one is not None]
-    return (
-        f"implied by test{'s' * (len(sources) > 1)} {first_of(sources, NAMED)}" if sources else ""
-    )
+    if sources:
+        return f"implied by test{'s' * (len(sources) > 1)} {first_of(sources, NAMED)}"
+    return ""

@@ -183,7 +183,9 @@ def lines() -> list[str]:
         found.append(
             f"{'*' if id in config.keys else ' '} {id:<{width}}  {keys[id]:<{room}}  {action.words}"
         )
-    return [*found, "", "* marks your own keys"] if config.keys else found
+    if config.keys:
+        return [*found, "", "* marks your own keys"]
+    return found
 
 
 def example_lines() -> list[str]:
@@ -203,8 +205,6 @@ def _written(keys: str) -> str:
 
 
 def _quoted(keys: str) -> str:
-    return (
-        keys
-        if all(char.isalnum() or char in "+, " for char in keys) and keys[0].isalpha()
-        else f'"{keys}"'
-    )
+    if all(char.isalnum() or char in "+, " for char in keys) and keys[0].isalpha():
+        return keys
+    return f'"{keys}"'

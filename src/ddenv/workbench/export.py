@@ -109,9 +109,10 @@ class ExportScreen(ModalScreen[None]):
                 yield Static("folder", classes="name", markup=False)
                 yield PathEntry(str(folder), id="export-folder")
             for id, title, end, _ in KINDS:
-                name = (
-                    f"{stem}{end}{ending_of(self._world) if id == 'world' else ''}" if end else "."
-                )
+                if end:
+                    name = f"{stem}{end}{ending_of(self._world) if id == 'world' else ''}"
+                else:
+                    name = "."
                 with Horizontal(classes="row"):
                     title = title.replace("SDF", "YAML") if is_directives(self._world) else title
                     yield Tick(title, id in TICKED, id=f"export-{id}", compact=True, classes="name")

@@ -110,9 +110,12 @@ class History(Screen[int | None]):
         for row in self._rows:
             node = row.node
             here = self._here
-            style = (
-                "bold" if node.number == here else "dim" if node.rejected or node.lost_rate else ""
-            )
+            if node.number == here:
+                style = "bold"
+            elif node.rejected or node.lost_rate:
+                style = "dim"
+            else:
+                style = ""
             size = f"{row.lines}{branches.sign(node, here)} {count(len(node.environment), 'model')}"
             marked = "marked" if node.number == self._marked else ""
             words = ", ".join(filter(None, (marked, branches.words(node, here))))
@@ -128,7 +131,9 @@ class History(Screen[int | None]):
     @property
     def under_cursor(self) -> Node | None:
         row = self.query_one(DataTable).cursor_row
-        return self._rows[row].node if 0 <= row < len(self._rows) else None
+        if 0 <= row < len(self._rows):
+            return self._rows[row].node
+        return None
 
     def on_data_table_row_highlighted(self) -> None:
         self._show_about()
@@ -195,8 +200,6 @@ def lines(first: Node, second: Node, here: int) -> Iterator[tuple[str, str, str]
 
 
 def _named(names: Sequence[str]) -> str:
-    return (
-        f"{len(names)}: {first_of([plain(shortened(name, 40)) for name in names], NAMED)}"
-        if names
-        else "none"
-    )
+    if names:
+        return f"{len(names)}: {first_of([plain(shortened(name, 40)) for name in names], NAMED)}"
+    return "none"

@@ -43,7 +43,9 @@ def run_workbench(
     if not config.theme:
         app.theme = fitting(app.console.color_system)
     result = app.run()
-    return result if isinstance(result, int) else app.return_code or 0
+    if isinstance(result, int):
+        return result
+    return app.return_code or 0
 
 
 def check_terminal() -> None:

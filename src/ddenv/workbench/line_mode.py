@@ -212,13 +212,12 @@ class LineMode:
     @property
     def _situation(self) -> Situation:
         snapshot = self._poll.snapshot
-        barred = (
-            WATCHING
-            if self._poll.watch
-            else "this run file cannot be read"
-            if snapshot.error
-            else ""
-        )
+        if self._poll.watch:
+            barred = WATCHING
+        elif snapshot.error:
+            barred = "this run file cannot be read"
+        else:
+            barred = ""
         return Situation(snapshot.state, snapshot.engine, barred)
 
     def _do(self, line: str) -> bool:

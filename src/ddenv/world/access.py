@@ -41,7 +41,9 @@ def is_directives(path: Path) -> bool:
 
 def ending_of(world: Path) -> str:
     """How the names of files end that hold a part of `world`."""
-    return DIRECTIVES_ENDINGS[0] if is_directives(world) else SDF_ENDINGS[0]
+    if is_directives(world):
+        return DIRECTIVES_ENDINGS[0]
+    return SDF_ENDINGS[0]
 
 
 def check_ending(file: Path, world: Path) -> None:
@@ -125,12 +127,10 @@ def not_yaml(where: object, error: Exception) -> UserError:
     """What a YAML parser says of the file `where`, with the line."""
     mark = getattr(error, "problem_mark", None)
     line = "" if mark is None else f":{mark.line + 1}"
-    problem = (
-        "nested too deeply"
-        if isinstance(error, RecursionError)
-        else getattr(error, "problem", None)
-    )
-    return UserError(f"{where}{line}: not valid YAML: {problem or 'not text'}")
+    problem = getattr(error, "problem", None) or "not text"
+    if isinstance(error, RecursionError):
+        problem = "nested too deeply"
+    return UserError(f"{where}{line}: not valid YAML: {problem}")
 
 
 def is_folder(path: Path) -> bool:
@@ -161,11 +161,9 @@ def without_tilde(name: str) -> Path:
 
 def reason(error: OSError) -> str:
     """Why a file cannot be read."""
-    return (
-        "no such file"
-        if isinstance(error, FileNotFoundError)
-        else f"cannot be read: {error.strerror or error}"
-    )
+    if isinstance(error, FileNotFoundError):
+        return "no such file"
+    return f"cannot be read: {error.strerror or error}"
 
 
 def read_bytes(path: Path) -> bytes:

@@ -26,7 +26,9 @@ _PLACEHOLDER = re.compile(r"\{(\w+)\}")
 def start_folder(scenario: Scenario) -> Path:
     """The folder in which the oracle's command starts, or where its module is searched."""
     own = None if scenario.oracle is None else scenario.oracle.folder
-    return scenario.folder if own is None else own
+    if own is None:
+        return scenario.folder
+    return own
 
 
 def command_words(scenario: Scenario) -> tuple[str, ...]:
@@ -72,11 +74,10 @@ def _existing(scenario: Scenario) -> Path:
     """The oracle's folder. Raises UserError if there is none."""
     folder = start_folder(scenario)
     if not folder.is_dir():
-        key = (
-            "folder"
-            if scenario.oracle is None or scenario.oracle.folder is None
-            else "oracle.folder"
-        )
+        if scenario.oracle is None or scenario.oracle.folder is None:
+            key = "folder"
+        else:
+            key = "oracle.folder"
         raise UserError(f"{key}: there is no folder {folder} to start the simulator in")
     return folder
 

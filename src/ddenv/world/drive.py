@@ -195,17 +195,17 @@ def _named(robot: Model, wheels: Wheels) -> dict[str, bool]:
     """The joints that `wheels` lists, and whether they are listed on the left."""
     turning = [joint.name for joint in robot.joints if _turns(joint)]
     others = {joint.name: joint.kind for joint in robot.joints if not _turns(joint)}
-    these = (
-        f"joints of '{robot.name}' that turn are {', '.join(turning)}"
-        if turning
-        else "none of its joints turns"
-    )
+    if turning:
+        these = f"joints of '{robot.name}' that turn are {', '.join(turning)}"
+    else:
+        these = "none of its joints turns"
     for side, names in (("left", wheels.left), ("right", wheels.right)):
         for name in names:
             why = f"there is no joint '{name}'{nearest(name, turning)}"
-            why = (
-                f"'{name}' is a {others[name]} joint that does not turn" if name in others else why
-            )
+            if name in others:
+                why = f"'{name}' is a {others[name]} joint that does not turn"
+            else:
+                why = why
             if name not in turning:
                 raise UserError(f"robot.wheels.{side}: {why}; {these}")
     name, times = Counter([*wheels.left, *wheels.right]).most_common(1)[0]

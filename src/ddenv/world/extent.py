@@ -127,7 +127,9 @@ def stacked(boxes: Iterable[Bounds]) -> Bounds:
 def around(boxes: Iterable[Bounds]) -> Bounds | None:
     """The box around all `boxes`; None if there are none."""
     low, high = stacked(boxes)
-    return (low.min(axis=0), high.max(axis=0)) if len(low) else None
+    if len(low):
+        return (low.min(axis=0), high.max(axis=0))
+    return None
 
 
 def bounds(collisions: Iterable[Collision], frame: Pose = HERE) -> Bounds | None:
@@ -148,7 +150,9 @@ def center(model: Model) -> Vector:
     frame if it fills nothing.
     """
     box = model_bounds(model)
-    return model.pose.position if box is None else vector((box[0] + box[1]) / 2)
+    if box is None:
+        return model.pose.position
+    return vector((box[0] + box[1]) / 2)
 
 
 def model_bounds(model: Model) -> Bounds | None:
@@ -194,7 +198,9 @@ BEYOND = 20.0  # minimum width of ground beyond all models, m
 def corners(world: World) -> tuple[Vector, Vector] | None:
     """The lowest and the highest corner of the box around all models, m; None if there are none."""
     box = bounds(world.collisions)
-    return None if box is None else (vector(box[0]), vector(box[1]))
+    if box is None:
+        return None
+    return (vector(box[0]), vector(box[1]))
 
 
 def with_ground_boxes(

@@ -194,4 +194,6 @@ def _section(model: type[BaseModel], location: list[str]) -> type[BaseModel]:
 def _shown(value: Any) -> str:
     # A short YAML file can hold a value that is endless when written out.
     text = reprlib.repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    if len(text) <= 60:
+        return text
+    return f"{text[:57]}..."

@@ -360,9 +360,9 @@ def is_ground(model: Model) -> bool:
     if any(isinstance(collision.shape, Ground) for collision in model.collisions):
         return True
     shown = any(isinstance(visual.shape, Plane) for visual in model.visuals)
-    boxes = (
-        (one.shape.size for one in model.collisions if isinstance(one.shape, Box)) if shown else ()
-    )
+    if not shown:
+        return False
+    boxes = (one.shape.size for one in model.collisions if isinstance(one.shape, Box))
     return any(min(size[:2]) >= ENDLESS for size in boxes)
 
 

@@ -73,7 +73,9 @@ class Clearance:
         )
         # From middle to middle of two columns that block it is half a column farther, on average,
         # than what is free.
-        return float(widths[number - 1]) - self.cell / 2 if number else 0.0
+        if number:
+            return float(widths[number - 1]) - self.cell / 2
+        return 0.0
 
     def outdoors(self) -> Booleans:
         """The columns (N, M) that are reached from a corner of the world without going through a

@@ -59,11 +59,10 @@ def check_spawn(world: World, robot: Model, spawn: Spawn, goal: Goal | None = No
     """
     if found := stands_inside(world, robot, spawn, goal):
         why, free = found
-        hint = (
-            "move the spawn"
-            if free is None
-            else f"free nearby: --spawn={free.x:g},{free.y:g},{free.z:g},{free.yaw:g}"
-        )
+        if free is None:
+            hint = "move the spawn"
+        else:
+            hint = f"free nearby: --spawn={free.x:g},{free.y:g},{free.z:g},{free.yaw:g}"
         raise UserError(f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g}): {why}; {hint}")
 
 
@@ -156,7 +155,9 @@ def at_start(world: World, robot: Model, spawn: Spawn) -> Model | None:
     without collision shapes.
     """
     found = _obstacle(*_shapes(world), robot, spawn)
-    return None if found is None else found[0]
+    if found is None:
+        return None
+    return found[0]
 
 
 def _shapes(world: World) -> tuple[list[tuple[Model, Collision]], Bounds]:
@@ -335,13 +336,19 @@ def _unlike(model: Model) -> str:
     hit = model_bounds(model)
     seen = around(shape_bounds(visual.shape, visual.pose) for visual in model.visuals)
     if seen is None:
-        return "" if hit is None else "unseen"
+        if hit is None:
+            return ""
+        return "unseen"
     size = seen[1] - seen[0]
     if hit is None:
         # Nobody minds driving over what is flat, such as the lines on a floor.
-        return "passable" if size[2] > THIN else ""
+        if size[2] > THIN:
+            return "passable"
+        return ""
     is_larger = ((hit[1] - hit[0])[:2] > LARGER * np.maximum(size, THIN)[:2]).any()
-    return "larger" if is_larger else ""
+    if is_larger:
+        return "larger"
+    return ""
 
 
 def inside(world: World) -> list[Inside]:
@@ -452,7 +459,9 @@ def overlap(a: Hull, b: Hull) -> float:
         depth = 0.0
     if depth > 0.0:
         return depth + grown
-    return max(0.0, grown - distance(a, b)) if grown else 0.0
+    if grown:
+        return max(0.0, grown - distance(a, b))
+    return 0.0
 
 
 def distance(a: Hull, b: Hull) -> float:

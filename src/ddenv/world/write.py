@@ -189,7 +189,9 @@ def _shown(
 
 def as_mesh(shape: Shape) -> Shape:
     """The triangles of terrain; any other shape as it is."""
-    return surface(shape) if isinstance(shape, Terrain) else shape
+    if isinstance(shape, Terrain):
+        return surface(shape)
+    return shape
 
 
 def _axis(holder: Element, axis: Vector, joint: Joint) -> None:
@@ -251,7 +253,9 @@ def _clean(name: str) -> str:
     """`name` without characters and words that SDF reserves."""
     name = "".join(char if char.isprintable() else "_" for char in name).replace("::", "_")
     reserved = name in RESERVED or (name.startswith("__") and name.endswith("__"))
-    return f"{name.strip('_') or 'a'}_" if reserved else name
+    if reserved:
+        return f"{name.strip('_') or 'a'}_"
+    return name
 
 
 def _unique(names: Iterable[str], taken: Collection[str] = ()) -> list[str]:

@@ -165,13 +165,15 @@ class _Worker:
 
     @property
     def free(self) -> int:
-        return self.threads - len(self.asked) if self.accepted else 0
+        if self.accepted:
+            return self.threads - len(self.asked)
+        return 0
 
     @property
     def name(self) -> str:
-        return (
-            self.address if self.hello is None else f"{self.address} ({printable(self.hello.host)})"
-        )
+        if self.hello is None:
+            return self.address
+        return f"{self.address} ({printable(self.hello.host)})"
 
 
 class ClusterPool:
@@ -425,7 +427,9 @@ class ClusterPool:
             nonlocal asked
             if asked is None and self._home is not None and self._reference is not None:
                 asked = self._home.settle(elements)
-            return None if asked is None else asked()
+            if asked is None:
+                return None
+            return asked()
 
         return found
 

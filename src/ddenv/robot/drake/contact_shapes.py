@@ -100,11 +100,10 @@ def _parts(collision: Collision, axles: Sequence[Joint], kind: Kind) -> list[Pla
         case Cylinder(radius, length):
             return cylinder(radius, length, kind)
         case Capsule(radius, length):
-            tube = (
-                cylinder(radius, length, kind)
-                if kind == "static"
-                else prism(radius, length, rolls=True)
-            )
+            if kind == "static":
+                tube = cylinder(radius, length, kind)
+            else:
+                tube = prism(radius, length, rolls=True)
             return [
                 *tube,
                 *(Placed(Sphere(radius), Pose((0.0, 0.0, end * length / 2))) for end in (-1, 1)),
@@ -225,7 +224,10 @@ def _spread(inside: float, step: float) -> list[float]:
     that is all.
     """
     count = 1 + math.ceil(inside / step - 1e-9)
-    return np.linspace(-inside, inside, count).tolist() if count > 1 else [0.0]
+    if count == 1:
+        return [0.0]
+    places: list[float] = np.linspace(-inside, inside, count).tolist()
+    return places
 
 
 def ring(radius: float, width: float, height: float) -> list[Placed]:

@@ -86,7 +86,9 @@ def world_friction(mu: float, wheels: float) -> float:
     user guide says what that makes of other contacts.
     """
     grip = min(mu, wheels)
-    return 1.0 / (2.0 / grip - 1.0 / wheels) if grip > 0.0 else 0.0
+    if grip > 0.0:
+        return 1.0 / (2.0 / grip - 1.0 / wheels)
+    return 0.0
 
 
 def surface(

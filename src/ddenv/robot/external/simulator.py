@@ -95,11 +95,10 @@ class ExternalSimulator:
         all its files are in the new folder `folder`. Raises UserError if no file can be written.
         """
         world = folder / self._scenario.world.name
-        file = (
-            world.with_name(f"{world.name}.poses.csv")
-            if has_placeholder(self._words, "log")
-            else None
-        )
+        if has_placeholder(self._words, "log"):
+            file = world.with_name(f"{world.name}.poses.csv")
+        else:
+            file = None
         log = PoseLog(progress if file is None else None)
         whole = world.with_name(f"{world.name}.scenario.yaml")
         values = {
@@ -116,7 +115,9 @@ class ExternalSimulator:
             if file is not None:
                 with contextlib.suppress(OSError):
                     size = file.stat().st_size
-            return TOO_LARGE if size > MOST_BYTES else ""
+            if size > MOST_BYTES:
+                return TOO_LARGE
+            return ""
 
         try:
             with running(words, start_folder(self._scenario), environment, folder) as command:
@@ -195,7 +196,9 @@ def _of_a_shell(code: int | None) -> str:
     was ended by one.
     """
     number = 0 if code is None else code - 128
-    return f" ({signal_name(number)})" if number in set(signal.Signals) else ""
+    if number in set(signal.Signals):
+        return f" ({signal_name(number)})"
+    return ""
 
 
 def scenario_in(scenario: Scenario, whole: Whole, file: Path) -> bytes:

@@ -75,7 +75,9 @@ def run(words: list[str], worker: socket.socket) -> str:
     signal_group(process.pid, signal.SIGKILL)
     kill_children()
     code = process.returncode
-    return f"exit {code}" if code >= 0 else f"signal {-code}"
+    if code >= 0:
+        return f"exit {code}"
+    return f"signal {-code}"
 
 
 def kill_children() -> None:

@@ -60,18 +60,24 @@ class Recovery:
                 gone = math.hypot(estimate.x - self._from.x, estimate.y - self._from.y)
                 going = gone < BACK and time < self._since + LONGEST_BACK
                 may = going and room(body, map_.spots, estimate, BACK_UP) is not None
-                return Twist(-self._speed, 0.0) if may else None
+                if may:
+                    return Twist(-self._speed, 0.0)
+                return None
             case 2:
                 self._turned += wrap(estimate.heading - self._heading)
                 self._heading = estimate.heading
                 turning = self._turned < math.tau and time < self._since + LONGEST_TURN
                 may = turning and room(body, map_.spots, estimate, TURN_LEFT) is not None
-                return Twist(0.0, self._rate) if may else None
+                if may:
+                    return Twist(0.0, self._rate)
+                return None
             case kind:
                 if time == self._since:
                     # What is near is kept where the lidar does not look.
                     map_.forget(estimate, NEAR if kind == 0 else 0.0, NEAR)
-                return STOP if time < self._since + LOOK else None
+                if time < self._since + LOOK:
+                    return STOP
+                return None
 
 
 # A controller stops when the estimated distance to the goal is within this fraction of its
@@ -258,7 +264,9 @@ class Navigator:
         estimate = reading.estimate
         self._think(time, estimate)
         if self._path is None:
-            return self._try_to_recover(reading) if time - self._found >= THINK - TICK else STOP
+            if time - self._found >= THINK - TICK:
+                return self._try_to_recover(reading)
+            return STOP
         twist = self._follower.step(self._path, estimate, self._near)
         if self._progress.is_stalled(time, estimate):
             return self._try_to_recover(reading)
@@ -324,7 +332,9 @@ class Navigator:
     def _try_to_recover(self, reading: Reading) -> Twist:
         self._recovers = self._recovery.begin(reading.time, reading.estimate)
         self.gave_up = not self._recovers
-        return STOP if self.gave_up else self._recover(reading)
+        if self.gave_up:
+            return STOP
+        return self._recover(reading)
 
     def _recover(self, reading: Reading) -> Twist:
         twist = self._recovery.step(reading.time, reading.estimate, self._map)

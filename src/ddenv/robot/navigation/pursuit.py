@@ -162,7 +162,9 @@ def room(body: Footprint, points: Floats, estimate: Estimate, places: Floats) ->
     now = apart[0]
     nearest = apart[1:].min(axis=0)
     may = np.minimum(now, np.maximum(np.minimum(now, 0.0) - GIVE, -body.margin))
-    return None if (nearest < may).any() else 0.0
+    if (nearest < may).any():
+        return None
+    return 0.0
 
 
 def _arc(distance: float, bearing: float) -> Floats:

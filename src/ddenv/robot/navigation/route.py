@@ -262,7 +262,9 @@ class Planner:
         # What is beside the robot now does not block its path.
         back[0] = -min(self._body.ahead, path.left)
         free, near = legs_beside(points, rest[:-1], rest[1:], back, path.on, self._body.side)
-        return min(float(near.min()), inflation) if free.all() else None
+        if free.all():
+            return min(float(near.min()), inflation)
+        return None
 
     def is_best(self, path: Path, points: Floats) -> bool:
         """Whether no path can be much better than what is left of `path`: it is free, with room,
@@ -283,10 +285,14 @@ class Planner:
             enough = max(self._tolerance, self._step) if goal_is_free else self._tolerance
             left[~((lengths < np.inf) & (left <= enough))] = np.inf
             best = int(left.argmin())
-            return best if left[best] < np.inf else None
+            if left[best] < np.inf:
+                return best
+            return None
         whole = lengths[self._border] * self._step + left[self._border]
         best = int(whole.argmin())
-        return int(self._border[best]) if whole[best] < np.inf else None
+        if whole[best] < np.inf:
+            return int(self._border[best])
+        return None
 
     def _costs(self, points: Floats) -> tuple[Floats, Floats]:
         """The factors (4, cells) for `Grid.search`, and the distance of the nearest point to each

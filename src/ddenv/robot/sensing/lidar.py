@@ -162,10 +162,14 @@ class LazyScan(Scan):
 
     @property
     def ranges(self) -> Floats:
-        return self._ranges() if callable(self._ranges) else self._ranges
+        if callable(self._ranges):
+            return self._ranges()
+        return self._ranges
 
     def within(self, limits: Floats) -> Floats:
-        return self._ranges(limits) if callable(self._ranges) else super().within(limits)
+        if callable(self._ranges):
+            return self._ranges(limits)
+        return super().within(limits)
 
     def __reduce__(self) -> tuple[type[Scan], tuple[Any, ...]]:
         return Scan, (self.time, self.angles, self.ranges, self.origin)

@@ -90,11 +90,10 @@ class Run:
         outcome, failure, cut, seconds = self._loop(progress or (lambda *_: None))
         trajectory = self._recording.trajectory()
         if outcome == "failed":
-            whole = (
-                np.vstack([trajectory, [self.context.clock.seconds, *trajectory[-1, 1:]]])
-                if cut
-                else trajectory
-            )
+            if cut:
+                whole = np.vstack([trajectory, [self.context.clock.seconds, *trajectory[-1, 1:]]])
+            else:
+                whole = trajectory
             failure = kind_of(whole, fell=failure == "fell", arrived=self.autonomy.arrived)
         seen = self.lidar.first_seen if self.lidar else {}
         took_part = None
@@ -191,7 +190,9 @@ class Run:
             if UNSOLVED in str(error):
                 return self._unsolved()
             return (str(error).strip() or type(error).__name__).splitlines()[0]
-        return "" if self._look() else "not-finite"
+        if self._look():
+            return ""
+        return "not-finite"
 
     def _unsolved(self) -> str:
         """What to say where the solver finds no contact forces: it fails where masses differ too

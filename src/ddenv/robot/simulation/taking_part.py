@@ -217,4 +217,6 @@ def _boxes(robot: Model) -> Iterator[Bounds]:
 
 def _slide(joint: Joint) -> float:
     """How far `joint` moves its child along its axis, m."""
-    return max(abs(joint.lower), abs(joint.upper)) if joint.kind == "prismatic" else 0.0
+    if joint.kind == "prismatic":
+        return max(abs(joint.lower), abs(joint.upper))
+    return 0.0

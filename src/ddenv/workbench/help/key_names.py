@@ -38,7 +38,9 @@ def shown(keys: str) -> str:
 
 def shown_key(key: str) -> str:
     *modifiers, name = key.split("+")
-    return "+".join((*modifiers, _ARROWS[name])) if name in _ARROWS else written(key)
+    if name in _ARROWS:
+        return "+".join((*modifiers, _ARROWS[name]))
+    return written(key)
 
 
 def written(key: str) -> str:

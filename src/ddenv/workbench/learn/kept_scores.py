@@ -14,9 +14,9 @@ FILE = "lessons.json"
 
 def all_scores() -> dict[str, Score]:
     kept = read_state(FILE)
-    return (
-        {str(name): score_of(data) for name, data in kept.items()} if isinstance(kept, dict) else {}
-    )
+    if isinstance(kept, dict):
+        return {str(name): score_of(data) for name, data in kept.items()}
+    return {}
 
 
 def keep_score(lesson: str, score: Score) -> None:

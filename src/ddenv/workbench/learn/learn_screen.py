@@ -71,16 +71,15 @@ class LearnScreen(Screen[ScreenResultType]):
 def snapshot_of(base: Snapshot, left: Names, turn: Turn | None = None) -> Snapshot:
     """The run of `base` as if `left` were its environment, with the parts of `turn`."""
     split = None if turn is None else turn.split
-    round = (
-        None
-        if turn is None or split is None
-        else Round(
+    if turn is None or split is None:
+        round = None
+    else:
+        round = Round(
             number=turn.round,
             n_partitions=len(split.partitions),
             split=split,
             candidates=PersistentTuple(),
         )
-    )
     return replace(
         base, state=base.state.changed(environment=left, round=round), past=True, pointed=None
     )

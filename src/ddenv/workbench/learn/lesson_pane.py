@@ -66,9 +66,10 @@ class LessonPane(VerticalScroll):
         ):
             return False
         last = len(page.question.answers) - 1
-        self.cursor = (
-            (0 if by > 0 else last) if self.cursor is None else max(0, min(self.cursor + by, last))
-        )
+        if self.cursor is None:
+            self.cursor = 0 if by > 0 else last
+        else:
+            self.cursor = max(0, min(self.cursor + by, last))
         self._draw(page)
         return True
 
@@ -108,7 +109,9 @@ class LessonPane(VerticalScroll):
 def letters(question: Question) -> str:
     used = LETTERS[: len(question.answers)]
     # After e there are gaps.
-    return f"{used[0]} to {used[-1]}" if used[-1] <= "e" else " ".join(used)
+    if used[-1] <= "e":
+        return f"{used[0]} to {used[-1]}"
+    return " ".join(used)
 
 
 def page_text(page: Page, room: int = 0, cursor: int | None = None) -> Text:

@@ -171,11 +171,10 @@ class LessonScreen(LearnScreen[bool]):
         page = self.course.page
         ended = self._opened is not None and course.step == course.last
         if ended:
-            following = (
-                f"\n\n`enter` opens the next lesson: **{self._following}**."
-                if self._following
-                else ""
-            )
+            if self._following:
+                following = f"\n\n`enter` opens the next lesson: **{self._following}**."
+            else:
+                following = ""
             done = f"Done. `backspace` goes back through it, `r` starts it again.{following}"
             page = replace(page, after=blocks(done))
         self.query_one(LessonPane).show(page)
@@ -211,15 +210,14 @@ class LessonScreen(LearnScreen[bool]):
         }
         for id, words in can.items():
             footer.say(id, words)
-        on = (
-            f"{course.activity}"
-            if due
-            else "next lesson"
-            if self._at_next
-            else ""
-            if ended
-            else "go on"
-        )
+        if due:
+            on = f"{course.activity}"
+        elif self._at_next:
+            on = "next lesson"
+        elif ended:
+            on = ""
+        else:
+            on = "go on"
         footer.say("lesson.on", "answer" if asked else on, letters(asked) if asked else "")
         self._keep_score()
 
@@ -246,11 +244,9 @@ class LessonScreen(LearnScreen[bool]):
         if test is not None:
             # With its path, as far as it is recorded, and the robot where it ended.
             pose = test.end_pose
-            live = (
-                ()
-                if pose is None or len(pose) < COLUMNS - 1
-                else (Live(slot=0, test=test.id, time=0.0, pose=pose),)
-            )
+            live: tuple[Live, ...] = ()
+            if pose is not None and len(pose) == COLUMNS - 1:
+                live = (Live(slot=0, test=test.id, time=0.0, pose=pose),)
             snapshot = replace(snapshot, evidence=self._moments.path(test.id), live=live)
         self.query_one("#lesson-world").border_title = (
             "World" if test is None else f"World: path of test {test.id}"

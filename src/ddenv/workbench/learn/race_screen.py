@@ -171,18 +171,22 @@ class RaceScreen(LearnScreen[None]):
         race = self.race
         for pane in self._panes:
             pane.show(race)
-        state = (
-            "over" if race.over else "runs: space pauses it" if self._runs_on else "space runs it"
-        )
+        if race.over:
+            state = "over"
+        elif self._runs_on:
+            state = "runs: space pauses it"
+        else:
+            state = "space runs it"
         header = Text(" Race", "bold", no_wrap=True, overflow="ellipsis").append(
             f" · {state}", "not bold"
         )
         header.append(f" · test {race.at}" if race.at else "", "not bold")
         self.query_one("#race-header", Static).update(header)
         panel = self.query_one("#race-panel", VerticalScroll)
-        panel.border_title = (
-            "Who won, and why" if race.over else "Tests that showed f, and tests that did not"
-        )
+        if race.over:
+            panel.border_title = "Who won, and why"
+        else:
+            panel.border_title = "Tests that showed f, and tests that did not"
         panel.border_subtitle = LEGEND
         # A line for each search: its tests so far, those that showed f, and those that did not, by
         # kind.

@@ -242,9 +242,10 @@ def _row(number: int, tried: Tried) -> Text:
     text.append(f"{SIGNS[tried.outcome]} ", "bold")
     # The shorter list says it best.
     shorter = len(tried.out) <= len(tried.kept)
-    words = (
-        f"without {_names(tried.out)}" if shorter else f"only {_names(tried.kept) or 'no model'}"
-    )
+    if shorter:
+        words = f"without {_names(tried.out)}"
+    else:
+        words = f"only {_names(tried.kept) or 'no model'}"
     return text.append(words, "bold" if tried.outcome == "similar" else "")
 
 

@@ -99,7 +99,9 @@ class Picture:
         row, column = cell
         grid = self.gone if self.dotted[cell] else self.grid
         owner = int(grid[2 * row : 2 * row + 2, column].max())
-        return None if owner == EMPTY else owner
+        if owner == EMPTY:
+            return None
+        return owner
 
 
 class MapDrawing:
@@ -120,7 +122,9 @@ class MapDrawing:
         points += [point for point in (shown.start, shown.place.goal, shown.failure) if point]
         whole = fit(shown.place.prints, points, columns, rows, margin=0.4)
         ways = fit((), points, columns, rows, margin=2.0) if shown.ways else whole
-        return ways if whole.scale > LARGE * ways.scale else whole
+        if whole.scale > LARGE * ways.scale:
+            return ways
+        return whole
 
     def follow(self, snapshot: Snapshot) -> None:
         """Adds to the paths behind the robots that drive now."""
@@ -192,15 +196,14 @@ class MapDrawing:
             return shown
         if self._moved is None or self._moved.place is not shown.place:
             self._moved = MovedPrints(shown.place)
-        poses = (
-            {} if live is None else {name: pose_of(values) for name, values in live.models.items()}
-        )
+        if live is None:
+            poses = {}
+        else:
+            poses = {name: pose_of(values) for name, values in live.models.items()}
         prints = self._moved.at(poses)
-        return (
-            shown
-            if prints is shown.place.prints
-            else replace(shown, place=replace(shown.place, prints=prints))
-        )
+        if prints is shown.place.prints:
+            return shown
+        return replace(shown, place=replace(shown.place, prints=prints))
 
 
 def _in_focus(snapshot: Snapshot) -> frozenset[int]:
@@ -283,9 +286,9 @@ def _room(drawn: Picture, at: tuple[int, int], text: str, sign: int) -> tuple[in
     """The row and column for a name beside a sign of so many cells, or on the model without one;
     None where there is no room.
     """
-    begins = (
-        ((0, sign + 1), (0, -len(text) - 1), (-1, 0), (1, 0)) if sign else ((0, 0), (-1, 0), (1, 0))
-    )
+    begins = [(0, 0), (-1, 0), (1, 0)]
+    if sign:
+        begins = [(0, sign + 1), (0, -len(text) - 1), (-1, 0), (1, 0)]
     for down, right in begins:
         row = at[0] + down
         column = at[1] + right
@@ -317,11 +320,9 @@ def _lines(shown: Shown, palette: Palette) -> Sequence[_Line]:
 
 def _path(rows: array[float] | None) -> np.ndarray:
     """Flat rows of a motion as (N, 2) m."""
-    return (
-        np.zeros((0, 2))
-        if rows is None
-        else np.array(rows, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
-    )
+    if rows is None:
+        return np.zeros((0, 2))
+    return np.array(rows, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
 
 
 def _crosshair(canvas: Canvas, cell: Cell, written: np.ndarray, palette: Palette) -> None:

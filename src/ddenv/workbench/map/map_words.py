@@ -138,7 +138,9 @@ def _standing(state: RunState, name: str) -> str:
     if name not in state.environment:
         return "removed"
     part = state.round.split.letter_of.get(name) if state.round else None
-    return "kept" if part is None else f"part {partition_letter(part)}"
+    if part is None:
+        return "kept"
+    return f"part {partition_letter(part)}"
 
 
 class MapLines(Widget):

@@ -128,9 +128,10 @@ def looks(prints: Sequence[Footprint], who: Kept, palette: Palette) -> Looks:
 @lru_cache(maxsize=4)
 def _known(prints: tuple[Footprint, ...]) -> tuple[Names, np.ndarray]:
     areas = np.array([each.area for each in prints])
-    large = (
-        areas > max(FLOOR_AREA, FLOOR_FACTOR * float(np.median(areas))) if len(areas) else areas > 0
-    )
+    if len(areas):
+        large = areas > max(FLOOR_AREA, FLOOR_FACTOR * float(np.median(areas)))
+    else:
+        large = areas > 0
     hollow = np.array([each.hollow for each in prints], dtype=bool)
     return tuple(each.name for each in prints), large & ~hollow
 

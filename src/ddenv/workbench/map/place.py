@@ -96,12 +96,16 @@ class Shown:
 
     @property
     def start(self) -> Point | None:
-        return None if self.place.spawn is None else self.place.spawn[:2]
+        if self.place.spawn is None:
+            return None
+        return self.place.spawn[:2]
 
     @property
     def failure(self) -> Point | None:
         position = self.snapshot.state.f_position
-        return None if position is None else position[:2]
+        if position is None:
+            return None
+        return position[:2]
 
     @property
     def same_paths(self) -> bool:

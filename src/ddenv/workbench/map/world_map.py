@@ -190,15 +190,15 @@ class WorldMap(Widget, can_focus=True):
         if self.picture is None or not self.picture.holds(cursor):
             return None
         owner = self.picture.owner(cursor)
-        return None if owner is None else self.place.prints[owner].name
+        if owner is None:
+            return None
+        return self.place.prints[owner].name
 
     def describe(self, name: str, columns: int = 0) -> Text:
         number = self._numbers.get(name)
-        return (
-            Text()
-            if number is None
-            else describe(self.snapshot.state, self.place.prints[number], columns)
-        )
+        if number is None:
+            return Text()
+        return describe(self.snapshot.state, self.place.prints[number], columns)
 
     def go_to(self, name: str) -> bool:
         number = self._numbers.get(name)
@@ -431,11 +431,10 @@ class Viewport:
         size.
         """
         view = self.view
-        new = (
-            fitting(columns, rows)
-            if view is None or self.fitted
-            else replace(view, columns=columns, rows=rows)
-        )
+        if view is None or self.fitted:
+            new = fitting(columns, rows)
+        else:
+            new = replace(view, columns=columns, rows=rows)
         # Drawings are reused for a view, so an equal view stays the same object.
         if new == view:
             return

@@ -385,7 +385,9 @@ class Playback(Screen[None]):
 
 
 def called(one: Played) -> str:
-    return f"test {one.test.id}" if one.test.id > 0 else "changed"
+    if one.test.id > 0:
+        return f"test {one.test.id}"
+    return "changed"
 
 
 def others(tests: Sequence[Test], one: Test) -> list[Test]:
@@ -405,16 +407,15 @@ def snapshot_with(state: RunState, there: Names, groups: tuple[Names, ...]) -> S
     """The run as if these models were its environment, and these `groups` the parts of its round,
     each with a letter.
     """
-    round = (
-        Round(
+    if groups:
+        round = Round(
             number=0,
             n_partitions=len(groups),
             split=Split(environment=there, partitions=groups),
             candidates=PersistentTuple(),
         )
-        if groups
-        else None
-    )
+    else:
+        round = None
     bare = state.changed(environment=there, round=round, trials=(), pinned=frozenset(), supports=())
     return Snapshot(state=bare, past=True)
 

@@ -70,9 +70,10 @@ class Asking:
     def situation(self) -> Situation:
         snapshot = self._poll.snapshot
         last = self._last[1]
-        pending = (
-            last.words(snapshot.state).brief if last is not None and self.waiting_for() else ""
-        )
+        if last is not None and self.waiting_for():
+            pending = last.words(snapshot.state).brief
+        else:
+            pending = ""
         return Situation(snapshot.state, snapshot.engine, self.barred, pending)
 
     @property
@@ -86,7 +87,9 @@ class Asking:
             )
         if snapshot.gone:
             return "the run file is gone: it can no longer be guided; q leaves"
-        return "this run file cannot be read" if snapshot.error else ""
+        if snapshot.error:
+            return "this run file cannot be read"
+        return ""
 
     def waiting_for(self) -> str:
         (id, command) = self._last
@@ -99,7 +102,9 @@ class Asking:
         if snapshot.state.last_command >= id or snapshot.engine != "alive":
             return ""
         late = int(time.monotonic() - self._asked_at)
-        return words if late < PATIENCE else f"{words}: no answer for {duration(late)}"
+        if late < PATIENCE:
+            return words
+        return f"{words}: no answer for {duration(late)}"
 
     def refuse(self, why: str) -> None:
         refuse(self._screen, why)

@@ -91,7 +91,9 @@ class Listed:
     def item(self, row: int) -> Item | None:
         if not 0 <= row < len(self):
             return None
-        return self.trials[row] if row < len(self.trials) else self.rest[row - len(self.trials)]
+        if row < len(self.trials):
+            return self.trials[row]
+        return self.rest[row - len(self.trials)]
 
 
 def listed(snapshot: Snapshot) -> Listed:
@@ -112,11 +114,10 @@ def round_title(state: RunState) -> tuple[str, str]:
         number = f" {certificate.number}" if certificate.number > 1 else ""
         rows = fresh_runs(state)
         aim = percent_at_least(certificate.certify_rate)
-        keeps = (
-            f"keeps {rows[0].shows_at_least}, aim {aim}"
-            if rows[0].shows_at_least
-            else f"has to show {aim}"
-        )
+        if rows[0].shows_at_least:
+            keeps = f"keeps {rows[0].shows_at_least}, aim {aim}"
+        else:
+            keeps = f"has to show {aim}"
         keeps = "chosen seeds" if certificate.seeds else keeps
         made = sum(one.runs for one in rows)
         far = made_of_usual(state, certificate) if in_the_making(state) else count(made, "run")
@@ -205,7 +206,9 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
 def _verdict(snapshot: Snapshot, item: Trial | Candidate, tests: Sequence[Test]) -> str:
     state = snapshot.state
     if isinstance(item, Trial) and item.verdict == "similar" and not state.ended:
-        return "● adopted" if item.adopted else "● a adopts it"
+        if item.adopted:
+            return "● adopted"
+        return "● a adopts it"
     if isinstance(item, Candidate) and state.waiting_candidate == item.index:
         return "? a or x"
     if item.verdict:
@@ -230,7 +233,9 @@ def _environment(one: FreshRuns, listing: Listed) -> str:
         return "what is left"
     if one.is_chosen:
         return "whole, missed"
-    return "whole world" if one.node == 0 else f"step {one.node}"
+    if one.node == 0:
+        return "whole world"
+    return f"step {one.node}"
 
 
 def _certificate_words(snapshot: Snapshot, one: FreshRuns, listing: Listed) -> Words:

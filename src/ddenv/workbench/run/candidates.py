@@ -75,11 +75,15 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     @property
     def under_cursor(self) -> Candidate | Trial | None:
         item = self.item
-        return None if isinstance(item, Test | FreshRuns) else item
+        if isinstance(item, Test | FreshRuns):
+            return None
+        return item
 
     @property
     def chosen(self) -> Candidate | Trial | None:
-        return None if self.following else self.under_cursor
+        if self.following:
+            return None
+        return self.under_cursor
 
     def words(self, row: int) -> Words:
         return words(self._snapshot, self._listed, row)
@@ -168,22 +172,22 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         if not cells:
             return Strip.blank(self.size.width, self.rich_style)
         is_cursor = row == self.cursor_row
-        style = (
-            self.get_component_rich_style("candidates--cursor") if is_cursor else self.rich_style
-        )
+        if is_cursor:
+            style = self.get_component_rich_style("candidates--cursor")
+        else:
+            style = self.rich_style
         return self._strip(cells, style)
 
     def _strip(self, cells: Words, style: Style) -> Strip:
         *others, last = self.columns
         row = "".join(_aligned(column, cells.get(column.name, "")) for column in others)
         words = cells.get(last.name, "")
-        emphasis = (
-            STRONG
-            if words.startswith(("●", "▶", "?"))
-            else WEAK
-            if words.startswith(("○", "⊘"))
-            else Style()
-        )
+        if words.startswith(("●", "▶", "?")):
+            emphasis = STRONG
+        elif words.startswith(("○", "⊘")):
+            emphasis = WEAK
+        else:
+            emphasis = Style()
         segments = [Segment(row, style), Segment(_aligned(last, f"  {words}"), style + emphasis)]
         return Strip(segments).adjust_cell_length(self.size.width, style)
 

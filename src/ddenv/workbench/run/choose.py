@@ -65,11 +65,10 @@ class ChooseModels(ModalScreen[Names | None]):
         self._part: str | None = None
 
     def compose(self) -> ComposeResult:
-        keys = (
-            "space tick   enter take   escape cancel"
-            if self._several
-            else "enter take it   escape cancel"
-        )
+        if self._several:
+            keys = "space tick   enter take   escape cancel"
+        else:
+            keys = "enter take it   escape cancel"
         with Framed("Models" if self._several else "Model", keys):
             yield Static(self._title, id="purpose", markup=False)
             yield Input(placeholder="part of a name", id="filter", compact=True)

@@ -124,9 +124,10 @@ class SceneDialog(ModalScreen[None]):
     def action_copy(self, what: str) -> None:
         if url := self._scene.url:
             self.app.copy_to_clipboard(url if what == "address" else ssh_line(url))
-        said = (
-            f"{what} copied, if the terminal allows it" if url else "the scene has no address yet"
-        )
+        if url:
+            said = f"{what} copied, if the terminal allows it"
+        else:
+            said = "the scene has no address yet"
         self.query_one(Framed).say(said)
 
     def action_stop(self) -> None:

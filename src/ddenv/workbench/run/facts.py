@@ -54,11 +54,10 @@ def facts(position: Position, number: int, command: str) -> tuple[str, Text] | N
             "which implies it"
         )
     elif test.is_finished:
-        computed = (
-            "its result was copied from another run"
-            if test.taken
-            else f"{test.wall_seconds:.1f} s of computing"
-        )
+        if test.taken:
+            computed = "its result was copied from another run"
+        else:
+            computed = f"{test.wall_seconds:.1f} s of computing"
         took = f"{test.simulated_seconds:.1f} s simulated, {computed}"
     said = {
         "end": how_it_ended(test),

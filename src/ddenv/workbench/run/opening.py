@@ -243,11 +243,10 @@ class Opening:
         self._screen.app.push_screen(dialog)
 
     def detach(self) -> None:
-        works = (
-            "The engine goes on"
-            if self._poll.snapshot.engine != "absent"
-            else "No engine is running"
-        )
+        if self._poll.snapshot.engine != "absent":
+            works = "The engine goes on"
+        else:
+            works = "No engine is running"
         again = f"{attach_name(self._poll.path)}{' --watch' if self._poll.watch else ''}"
         self._exit(f"{works}. Attach again with: ddenv open {again}")
 

@@ -318,14 +318,14 @@ class RunScreen(Screen[None]):
         names = self.world.selection
         if not names and self.world.has_focus and (name := self.world.model_at_cursor) is not None:
             names = frozenset((name,))
-        known = (
-            tuple(name for name in self.poll.snapshot.state.elements if name in names)
-            if names
-            else ()
-        )
-        row = (
-            self.table.under_cursor if self.table.is_attached and self.table.is_on_screen else None
-        )
+        if names:
+            known = tuple(name for name in self.poll.snapshot.state.elements if name in names)
+        else:
+            known = ()
+        if self.table.is_attached and self.table.is_on_screen:
+            row = self.table.under_cursor
+        else:
+            row = None
         return Pointed(row, self.table.following, (*known, *sorted(names.difference(known))))
 
     def _offer(self, name: str) -> Offer:
@@ -337,7 +337,9 @@ class RunScreen(Screen[None]):
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         if action != "guide":
             return True
-        return None if self._offer(str(parameters[0])).why_not else True
+        if self._offer(str(parameters[0])).why_not:
+            return None
+        return True
 
     def action_guide(self, name: str) -> None:
         """Does what a key means now; it asks for models if none are selected but some are needed,
@@ -394,7 +396,9 @@ class RunScreen(Screen[None]):
             return BROWSING
         if self.snapshot.state.status == "finished" and not self.poll.watch:
             return ENDED
-        return ON_MAP if self.world.has_focus else ()
+        if self.world.has_focus:
+            return ON_MAP
+        return ()
 
     # Earlier moments of the run.
 

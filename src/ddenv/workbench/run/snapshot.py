@@ -40,7 +40,9 @@ class Browsing:
         """
         if self.position.step(what, by):
             return ""
-        return f"there is no {what} before this moment" if by < 0 else "this is now already"
+        if by < 0:
+            return f"there is no {what} before this moment"
+        return "this is now already"
 
     @property
     def snapshot(self) -> Snapshot:
@@ -82,6 +84,8 @@ class Moments:
         good for much without it.
         """
         try:
-            return None if test is None else self._motion(test)
+            if test is None:
+                return None
+            return self._motion(test)
         except UserError:
             return None

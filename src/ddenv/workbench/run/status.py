@@ -102,11 +102,10 @@ class Status(Widget):
             return
         self._snapshot = snapshot
         self._besides = (scene, asked, place)
-        now = (
-            facts(snapshot, scene, asked)
-            if place is None
-            else facts_of_past(snapshot, scene, *place)
-        )
+        if place is None:
+            now = facts(snapshot, scene, asked)
+        else:
+            now = facts_of_past(snapshot, scene, *place)
         if now != self._facts:
             self._facts = now
             self.refresh()
@@ -230,11 +229,10 @@ def fitted(said: Facts, width: int) -> list[tuple[str, str]]:
 def tests_said(state: RunState) -> Sentences:
     counts = state.outcomes()
     total = state.tests_done
-    said = (
-        count(total, "test")
-        if state.budget is None
-        else f"{state.made} of {count(state.budget, 'test')}"
-    )
+    if state.budget is None:
+        said = count(total, "test")
+    else:
+        said = f"{state.made} of {count(state.budget, 'test')}"
     said += f", {state.implied} implied" if state.implied else ""
     # Before its end, anything may still come to be needed.
     said += (
@@ -253,7 +251,9 @@ def drift_said(state: RunState) -> Sentences:
     forms = drift(state)
     if has_dropped(state):
         return tuple(f"▼ {form}: u goes back" for form in forms)
-    return (*forms, "") if forms else ()
+    if forms:
+        return (*forms, "")
+    return ()
 
 
 def engine_said(snapshot: Snapshot) -> Sentences:
@@ -263,7 +263,9 @@ def engine_said(snapshot: Snapshot) -> Sentences:
         return ("engine ◌", "")
     if snapshot.engine != "alive":
         silent = state.status == "finished" or snapshot.status == "lost" or snapshot.gone
-        return () if silent else ("engine ○ off: r resumes", "")
+        if silent:
+            return ()
+        return ("engine ○ off: r resumes", "")
     version = plain(state.engine_version)
     if version in ("", __version__):
         return ("engine ●", "")
@@ -281,9 +283,10 @@ def title(snapshot: Snapshot) -> str:
     said = "" if snapshot.status in ("running", "baseline") else f", {word}"
     left = remaining(state, snapshot.engine == "alive")
     done = state.tests_done
-    part = (
-        "" if left is None else f"{STEP * int(100 * done / max(1, done + left.tests[1]) / STEP)} % "
-    )
+    if left is None:
+        part = ""
+    else:
+        part = f"{STEP * int(100 * done / max(1, done + left.tests[1]) / STEP)} % "
     return f"{sign} {part}{name}: {models}{said}"
 
 
@@ -295,9 +298,8 @@ def worth_a_look(before: Snapshot, now: Snapshot) -> str:
     state = now.state
     if status == "waiting":
         return "a reduction waits for you: accept or reject it"
-    said = (
-        ended(state)
-        if status == "finished"
-        else ", ".join(filter(None, (STATUS[status][1], state.reason)))
-    )
+    if status == "finished":
+        said = ended(state)
+    else:
+        said = ", ".join(filter(None, (STATUS[status][1], state.reason)))
     return f"{len(state.environment)} of {count(len(state.elements), 'model')} left; {plain(said)}"

@@ -94,7 +94,9 @@ def bring_back(folder: Path) -> Path:
 def _places(folder: Path) -> list[Path]:
     """A folder for each deletion, named by its time in ns."""
     home = folder / FOLDER
-    return [each for each in home.iterdir() if each.name.isdecimal()] if home.is_dir() else []
+    if home.is_dir():
+        return [each for each in home.iterdir() if each.name.isdecimal()]
+    return []
 
 
 class RunsScreen(Screen[None]):

@@ -119,7 +119,9 @@ def moment(time: float) -> str:
     except (ValueError, OverflowError, OSError):
         # File systems allow years beyond the calendar.
         return "?"
-    return f"{then:%H:%M:%S}" if then.date() == today else f"{then.day} {then:%b %Y}"
+    if then.date() == today:
+        return f"{then:%H:%M:%S}"
+    return f"{then.day} {then:%b %Y}"
 
 
 class RunTable(DataTable[Text]):
@@ -141,7 +143,9 @@ class RunTable(DataTable[Text]):
 
     @property
     def chosen(self) -> Recent | None:
-        return self._runs[self.cursor_row] if 0 <= self.cursor_row < len(self._runs) else None
+        if 0 <= self.cursor_row < len(self._runs):
+            return self._runs[self.cursor_row]
+        return None
 
     @property
     def _followed(self) -> Recent | None:
@@ -149,7 +153,9 @@ class RunTable(DataTable[Text]):
         cursor at the top stays there.
         """
         is_reading = any(not run.status and not run.trouble for run in self._runs)
-        return None if is_reading and self.cursor_row == 0 else self.chosen
+        if is_reading and self.cursor_row == 0:
+            return None
+        return self.chosen
 
     def show(self, runs: list[Recent], order: str) -> None:
         """Shows these in this order, whose column is marked; the cursor stays on its run."""

@@ -70,12 +70,16 @@ class Choice:
         except UserError:
             # Start then reports the file's error.
             return GAP
-        return GAP if box is None else GAP + float(self.robot.pose.position[2] - box[0][2])
+        if box is None:
+            return GAP
+        return GAP + float(self.robot.pose.position[2] - box[0][2])
 
     def spawn_height(self, x: float, y: float) -> float | None:
         """The z of a spawn at (x, y), m, to the mm; None where there is no ground."""
         top = self._ground(x, y)
-        return None if top is None else round(top + self.height_above, 3)
+        if top is None:
+            return None
+        return round(top + self.height_above, 3)
 
     def _ground(self, x: float, y: float) -> float | None:
         """The highest top of the boxes around the shapes at (x, y), m. None where there is
@@ -103,7 +107,9 @@ class Choice:
 
     @property
     def name(self) -> str:
-        return self.path.name if self.bare else self.settings.name
+        if self.bare:
+            return self.path.name
+        return self.settings.name
 
     @property
     def models(self) -> int:
@@ -148,9 +154,10 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
             scenario, world, _ = read_parts(run)
         return Choice(path=path, world=world, settings=scenario, run=True)
     bare = is_read_as_world(path)
-    settings = (
-        scenario_for_world(path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0)) if bare else load_scenario(path)
-    )
+    if bare:
+        settings = scenario_for_world(path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+    else:
+        settings = load_scenario(path)
     try:
         world, chosen, missing = read_with_remedies(settings.world, settings.reading, options)
     except Unsupported as error:

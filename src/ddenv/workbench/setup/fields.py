@@ -34,7 +34,9 @@ MORE = f"▸ more settings (f9): {', '.join(one.label for one in form.ADVANCED)}
 
 def not_used(one: Setting, algorithm: str) -> str:
     unused = one.used_by and algorithm in OURS["algorithm"] and algorithm not in one.used_by
-    return f"Not used by {plain(algorithm)}." if unused else ""
+    if unused:
+        return f"Not used by {plain(algorithm)}."
+    return ""
 
 
 class OptionsForm(Vertical):
@@ -129,7 +131,9 @@ class OptionsForm(Vertical):
     @property
     def own_name(self) -> str:
         name = self.texts["run_name"].strip()
-        return name if self._name_given and name != self._suggested else ""
+        if self._name_given and name != self._suggested:
+            return name
+        return ""
 
     def show_settings(self, scenario: Scenario, places: Mapping[str, str]) -> None:
         """Fills in the scenario's settings, in place of all earlier texts, with the texts of
@@ -175,11 +179,10 @@ class OptionsForm(Vertical):
         most depends on.
         """
         # An open list of names is a widget inside its field.
-        near = (
-            []
-            if widget is None
-            else [each.id for each in (widget, widget.parent) if each is not None]
-        )
+        if widget is None:
+            near = []
+        else:
+            near = [each.id for each in (widget, widget.parent) if each is not None]
         id = next((each for each in near if each in FIELDS or each in KINDS), "") or ""
         pair, algorithm = self.method
         panel = self.query_one("#explained")

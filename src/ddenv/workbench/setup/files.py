@@ -54,11 +54,9 @@ def remember(path: Path) -> None:
 
 def _listed() -> list[Path]:
     names = read_state(RECENT)
-    return (
-        [Path(name) for name in names if isinstance(name, str) and name]
-        if isinstance(names, list)
-        else []
-    )
+    if isinstance(names, list):
+        return [Path(name) for name in names if isinstance(name, str) and name]
+    return []
 
 
 class FileList(OptionList):

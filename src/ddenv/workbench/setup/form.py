@@ -81,7 +81,9 @@ def in_words(wrong: Mapping[str, str]) -> str:
 
 
 def choices(one: Setting) -> Names:
-    return (OFF, ON) if one.kind is bool else one.choices
+    if one.kind is bool:
+        return (OFF, ON)
+    return one.choices
 
 
 def value(one: Setting, text: str) -> Value:
@@ -126,11 +128,17 @@ def values(fields: tuple[Setting, ...], texts: Mapping[str, str]) -> dict[str, V
 
 def text_of(value: Value) -> str:
     if isinstance(value, bool):
-        return ON if value else OFF
+        if value:
+            return ON
+        return OFF
     if isinstance(value, float):
         short = f"{value:g}"
-        return short if float(short) == value else repr(value)
-    return "" if value is None else str(value)
+        if float(short) == value:
+            return short
+        return repr(value)
+    if value is None:
+        return ""
+    return str(value)
 
 
 def places_of(scenario: Scenario) -> dict[str, float]:

@@ -112,11 +112,10 @@ def read_with_remedies(
             (note.why.removeprefix(begin) for note in world.notes if note.why.startswith(begin)),
             "left out",
         )
-        words = (
-            f"in {text}"
-            if text.startswith("/")
-            else by.removeprefix("a guess, ").removeprefix("the stand-in ")
-        )
+        if text.startswith("/"):
+            words = f"in {text}"
+        else:
+            words = by.removeprefix("a guess, ").removeprefix("the stand-in ")
         if not text:
             words = f"not in {vain[uri]}; guess {words}" if uri in vain else f"guess {words}"
         kind = MISSING
@@ -230,7 +229,9 @@ class MissingList(OptionList):
     @property
     def _here(self) -> list[str]:
         place = self.highlighted
-        return [] if place is None else [row.uri for row in self._rows[place : place + 1]]
+        if place is None:
+            return []
+        return [row.uri for row in self._rows[place : place + 1]]
 
 
 class AskRemedy(ModalScreen[str | None]):

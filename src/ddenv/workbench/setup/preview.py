@@ -190,9 +190,10 @@ class Preview(Vertical):
                 self.map.focus()
         else:
             texts = self._form.texts if self._keeps_places else {}
-            places = (
-                {one.name: texts.get(one.name, "") for one in form.PLACES} if choice.bare else {}
-            )
+            if choice.bare:
+                places = {one.name: texts.get(one.name, "") for one in form.PLACES}
+            else:
+                places = {}
             self._form.show_settings(choice.settings, places)
         self.post_message(self.Read(opened and not again))
 
@@ -373,11 +374,10 @@ class Preview(Vertical):
         with suppress(UserError):
             if spawn is not None and (robot := choice.robot):
                 start = Spawn(x=spawn[0], y=spawn[1], z=spawn[2], yaw=spawn[3])
-                end = (
-                    choice.settings.goal.model_copy(update={"x": goal[0], "y": goal[1]})
-                    if goal
-                    else None
-                )
+                if goal:
+                    end = choice.settings.goal.model_copy(update={"x": goal[0], "y": goal[1]})
+                else:
+                    end = None
                 found = tuple(notes_on_start(choice.world, robot, start, end))
                 if (inside := stands_inside(choice.world, robot, start, end)) is not None:
                     why, place = inside
@@ -423,4 +423,6 @@ def _metres(value: float) -> str:
 
 
 def _point(place: tuple[float, ...] | None) -> str:
-    return f"({place[0]:.2f}, {place[1]:.2f}) m" if place else "not set"
+    if place:
+        return f"({place[0]:.2f}, {place[1]:.2f}) m"
+    return "not set"

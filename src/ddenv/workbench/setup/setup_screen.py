@@ -262,11 +262,9 @@ class SetupScreen(Screen[None]):
         return choice, form.asked_of(choice.settings, self.form.texts, pair, algorithm)
 
     def _command(self, choice: Choice, scenario: Scenario) -> list[str]:
-        return (
-            []
-            if choice.run
-            else command_words(choice, scenario, self.form.jobs, self.form.own_name)
-        )
+        if choice.run:
+            return []
+        return command_words(choice, scenario, self.form.jobs, self.form.own_name)
 
     def action_copy(self) -> None:
         try:

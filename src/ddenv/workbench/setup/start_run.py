@@ -15,7 +15,7 @@ from ddenv.errors import UserError
 from ddenv.runs import processor
 from ddenv.runs.folder import run_path
 from ddenv.settings import OPTIONS, PRINTED, number_text, read
-from ddenv.text import about, between, count, rounded
+from ddenv.text import Data, about, between, count, rounded
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.files import remember
@@ -69,7 +69,9 @@ def _events_of(path: Path, scenario: Scenario) -> list[Recorded]:
             data = json.loads(run.document("scenario"))
             files = (Path(each).name for each in (data["world"], data["robot"]["model"]))
             timeout = data.get("failure", {}).get("timeout", scenario.failure.timeout)
-            return run.events() if (data["name"], *files, timeout) == asked else []
+            if (data["name"], *files, timeout) == asked:
+                return run.events()
+            return []
     except (UserError, ValueError, RecursionError, KeyError, TypeError, AttributeError):
         return []
 
@@ -121,12 +123,32 @@ def command_words(choice: Choice, asked: Scenario, jobs: int, name: str = "") ->
     for option, fields in (("spawn", form.SPAWN), ("goal", form.GOAL)):
         if choice.bare or any(places[one.name] != own[one.name] for one in fields):
             words.append(f"--{option}={','.join(number_text(places[one.name]) for one in fields)}")
+    words += _setting_words(before, after)
+    words += _reading_words(choice)
+    if jobs != processor.usable_cores():
+        words += ["--jobs", str(jobs)]
+    if len(Path(name).parts) > 1:
+        return [*words, "--output", str(Path(name).absolute())]
+    if name:
+        return [*words, "--name", name]
+    return words
+
+
+def _setting_words(before: Data, after: Data) -> list[str]:
+    """The options for the settings that differ."""
+    words: list[str] = []
     changed = [one for one in OPTIONS if read(after, one) != read(before, one)]
     # As printed sets the others.
     others = PRINTED if any(one.name == "as_printed" for one in changed) else {}
     for one in changed:
         if one.name not in others:
             words += one.words(read(after, one))
+    return words
+
+
+def _reading_words(choice: Choice) -> list[str]:
+    """The options for how the world is read."""
+    words: list[str] = []
     for option, values in choice.options.items():
         if option == "inside":
             words += ["--inside"] if values else []
@@ -137,11 +159,7 @@ def command_words(choice: Choice, asked: Scenario, jobs: int, name: str = "") ->
                 f"--{option.replace('_', '-')}",
                 str(value.absolute()) if isinstance(value, Path) else str(value),
             ]
-    if jobs != processor.usable_cores():
-        words += ["--jobs", str(jobs)]
-    if len(Path(name).parts) > 1:
-        return [*words, "--output", str(Path(name).absolute())]
-    return [*words, "--name", name] if name else words
+    return words
 
 
 def create(
@@ -173,11 +191,10 @@ def run_file(scenario_name: str, name: str) -> Path:
     """The path of a new run with this `name` or path. Raises FieldError."""
     is_path = len(Path(name).parts) > 1
     try:
-        path = (
-            run_path(scenario_name, None, Path(name))
-            if is_path
-            else run_path(scenario_name, name, None)
-        )
+        if is_path:
+            path = run_path(scenario_name, None, Path(name))
+        else:
+            path = run_path(scenario_name, name, None)
         wrong = f"{path} exists already; choose another name" if path.exists() else ""
     except UserError as error:
         wrong = str(error).partition(": ")[2]

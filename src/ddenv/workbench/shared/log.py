@@ -36,11 +36,9 @@ class Log:
     def until(self, event: int | None) -> list[Entry]:
         """The entries of an event and of all before it; all there are for None."""
         found = self._entries
-        return (
-            found[:]
-            if event is None
-            else found[: bisect_right(found, event, key=lambda entry: entry.event)]
-        )
+        if event is None:
+            return found[:]
+        return found[: bisect_right(found, event, key=lambda entry: entry.event)]
 
     def add(self, kind: str, before: RunState, after: RunState) -> None:
         from ddenv.words.news import news

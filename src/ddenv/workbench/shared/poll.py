@@ -106,11 +106,9 @@ class Poll:
         if last is not None and not self._behind:
             # The time goes on.
             spent = self._spent(engine)
-            return (
-                last
-                if (engine, spent) == (last.engine, last.spent)
-                else replace(last, engine=engine, spent=spent)
-            )
+            if (engine, spent) == (last.engine, last.spent):
+                return last
+            return replace(last, engine=engine, spent=spent)
         error, more = self._follow()
         state = self._state
         spent = self._spent(engine)
@@ -185,7 +183,9 @@ class Poll:
             self._alive = alive
         if self._alive:
             return "alive"
-        return "starting" if self._starting() else "absent"
+        if self._starting():
+            return "starting"
+        return "absent"
 
     def _poses(self, state: RunState) -> tuple[tuple[Live, ...], bool]:
         """Where the robots are, and whether that was read just now. Valid rows name a test and have

@@ -111,11 +111,10 @@ def guard(port: int, token: str) -> Any:
             # Other pages must not show it in a frame to catch clicks.
             response.headers["X-Frame-Options"] = "DENY"
             response.headers["Referrer-Policy"] = "no-referrer"
-            text = (
-                response.text
-                if response.content_type == "text/html" and hasattr(response, "text")
-                else ""
-            )
+            if response.content_type == "text/html" and hasattr(response, "text"):
+                text = response.text
+            else:
+                text = ""
             # What a page may load and run: the terminal of textual-serve, and the connection to the
             # workbench.
             rules = {

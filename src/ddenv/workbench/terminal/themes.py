@@ -74,7 +74,9 @@ def theme_called(name: str, where: str) -> str:
 
 def fitting(color_system: str | None) -> str:
     # Colours of ddenv's themes would become the nearest of sixteen, and some the same.
-    return ANSI if color_system == "standard" else DARK.name
+    if color_system == "standard":
+        return ANSI
+    return DARK.name
 
 
 def for_rich(variables: Mapping[str, str]) -> dict[str, str]:
@@ -100,9 +102,10 @@ def ink(variables: Mapping[str, str], name: str, *, bold: bool = False) -> Style
     try:
         value = variables[name]
         # In Textual `blue` is the web's colour, not the terminal's.
-        color = (
-            RichColor.parse(value) if value in ANSI_COLOR_NAMES else Color.parse(value).rich_color
-        )
+        if value in ANSI_COLOR_NAMES:
+            color = RichColor.parse(value)
+        else:
+            color = Color.parse(value).rich_color
     except (KeyError, ColorParseError):
         color = None
     return Style(color=color, bold=bold or None)

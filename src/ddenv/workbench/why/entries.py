@@ -71,11 +71,10 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
         claim = claims.get(each.without)
         sign = partition_letter(number)
         ways = ("with", "without")
-        rates = (
-            f"{rate(claim)}; {meaning(claim, certificate)}."
-            if claim is not None and certificate is not None
-            else ""
-        )
+        if claim is not None and certificate is not None:
+            rates = f"{rate(claim)}; {meaning(claim, certificate)}."
+        else:
+            rates = ""
         more = rates, parting_sentence(each)
         models.append(
             Entry(
@@ -194,14 +193,13 @@ def head_of(state: RunState, works: bool) -> str:
     shows in what is left.
     """
     certificate = current(state)
-    title = (
-        "Why it fails"
-        if state.isolating is None
-        else isolating(state) + ("" if works else " (stopped)")
-    )
-    return (
-        title if certificate is None else f"{title} · what is left: {rate(certificate.claims[0])}"
-    )
+    if state.isolating is None:
+        title = "Why it fails"
+    else:
+        title = isolating(state) + ("" if works else " (stopped)")
+    if certificate is None:
+        return title
+    return f"{title} · what is left: {rate(certificate.claims[0])}"
 
 
 def nothing_yet(state: RunState, works: bool, run: str) -> str:

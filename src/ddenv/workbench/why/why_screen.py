@@ -242,7 +242,9 @@ class WhyScreen(Screen[None]):
     @property
     def entry(self) -> Entry | None:
         at = self.query_one("#why-list", OptionList).highlighted
-        return self._entries[at] if at is not None and at < len(self._entries) else None
+        if at is not None and at < len(self._entries):
+            return self._entries[at]
+        return None
 
     @on(OptionList.OptionHighlighted)
     def _show_entry(self) -> None:
@@ -257,11 +259,10 @@ class WhyScreen(Screen[None]):
         apart = (one.letter.lower(), "left out in one") if one.gone else None
         self.map.show_limits(one.limits)
         self.map.show_ways(ways, parting, apart, self._place.prints)
-        title = (
-            "World"
-            if one.parting is None or not ways
-            else f"The two paths, seed {one.parting.seed}"
-        )
+        if one.parting is None or not ways:
+            title = "World"
+        else:
+            title = f"The two paths, seed {one.parting.seed}"
         self.query_one("#why-world").border_title = Text(title)
         self.query_one(MapLines).show(self.map.shown)
 

@@ -51,4 +51,6 @@ def completed(text: str) -> str:
         return text
     # Letter by letter, as a shell does.
     common = os.path.commonprefix(names)  # noqa: RUF071
-    return text[: len(text) - len(begin)] + common if len(common) > len(begin) else text
+    if len(common) > len(begin):
+        return text[: len(text) - len(begin)] + common
+    return text

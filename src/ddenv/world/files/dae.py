@@ -62,7 +62,9 @@ def _metres(root: Element) -> float:
         metres = float("1" if unit is None else unit.get("meter", "1"))
     except ValueError:
         return 1.0
-    return metres if math.isfinite(metres) and metres > 0 else 1.0
+    if math.isfinite(metres) and metres > 0:
+        return metres
+    return 1.0
 
 
 @dataclass
@@ -90,7 +92,9 @@ class _Document:
         if target is None or target.tag != "controller":
             return target
         skin = target.find("skin")
-        return None if skin is None else self.named("geometry", skin.get("source"))
+        if skin is None:
+            return None
+        return self.named("geometry", skin.get("source"))
 
     def weight(self, element: Element, weights: dict[Element, int]) -> int:
         """The approximate bytes of `element` with everything it places. Raises RecursionError if it

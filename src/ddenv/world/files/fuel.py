@@ -99,7 +99,9 @@ def cached(model: FuelModel) -> Iterator[Path]:
 def newest(folder: Path) -> list[Path]:
     """The newest version of a model in a cache, if there is one."""
     versions = [entry for entry in folders_of(folder) if entry.isdecimal()]
-    return [folder / max(versions, key=int)] if versions else []
+    if versions:
+        return [folder / max(versions, key=int)]
+    return []
 
 
 def refuse_link_out(path: Path) -> None:

@@ -193,11 +193,9 @@ def _leads_out(entry: zipfile.ZipInfo) -> bool:
 
 def _reason(error: OSError | HTTPException) -> str:
     if isinstance(error, HTTPError):
-        return (
-            "is not in Fuel"
-            if error.code == 404
-            else f"the server answered {error.code} {error.reason}"
-        )
+        if error.code == 404:
+            return "is not in Fuel"
+        return f"the server answered {error.code} {error.reason}"
     cause = error.reason if isinstance(error, URLError) else error
     if isinstance(cause, TimeoutError):
         return f"the server sent nothing for {TIMEOUT:g} s"

@@ -27,11 +27,10 @@ def kept_file(vertices: Floats, faces: Integers, most: int) -> Path:
     user's cache folder.
     """
     home = os.environ.get("DDENV_HOME")
-    folder = (
-        Path(home) / "cache"
-        if home
-        else Path(platformdirs.user_cache_dir("ddenv", appauthor=False))
-    )
+    if home:
+        folder = Path(home) / "cache"
+    else:
+        folder = Path(platformdirs.user_cache_dir("ddenv", appauthor=False))
     digest = hashlib.blake2b(digest_size=16)
     digest.update(f"{RULES} {version('manifold3d')} {most} {len(vertices)} ".encode())
     digest.update(vertices.astype("<f8").tobytes())

@@ -58,7 +58,9 @@ def read_parts(path: Path) -> list[Part]:
             # Of older numpy versions, about numbers that are half read.
             warnings.filterwarnings("error", message="string or file could not be read")
             plain = {".obj": read_obj, ".stl": read_stl, ".dae": read_dae}.get(suffix)
-            return read_gltf(data, path.parent, MESH_LIMIT) if plain is None else plain(data)
+            if plain is None:
+                return read_gltf(data, path.parent, MESH_LIMIT)
+            return plain(data)
     except Unusable:
         raise
     except MemoryError:
@@ -297,7 +299,9 @@ def _thin_axes(points: np.ndarray, limit: float) -> list[np.ndarray]:
     normal = np.cross(along, aside[widths.argmax()] / widths.max())
     normal /= math.sqrt((normal * normal).sum())
     heights = _along(offsets, normal)
-    return [normal] if heights.max() - heights.min() <= limit else []
+    if heights.max() - heights.min() <= limit:
+        return [normal]
+    return []
 
 
 def _along(points: np.ndarray, direction: np.ndarray | Vector) -> np.ndarray:

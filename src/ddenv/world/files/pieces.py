@@ -103,7 +103,9 @@ def convex_pieces(vertices: Floats, faces: Integers, most: int) -> list[Surface]
         pieces = pieces[: most - 2 * most_patches]
         patches += _patches([vertices[faces] for vertices, faces in small], most_patches)
     pieces += [convex_hull(corners) for corners in patches]
-    return pieces if len(pieces) > 1 else [whole]
+    if len(pieces) > 1:
+        return pieces
+    return [whole]
 
 
 def connected_parts(vertices: Floats, faces: Integers) -> list[trimesh.Trimesh]:
@@ -130,7 +132,9 @@ def solid_of(part: trimesh.Trimesh) -> Manifold | None:
     solid = Manifold(
         Mesh64(np.ascontiguousarray(part.vertices), np.ascontiguousarray(faces, dtype=np.uint64))
     )
-    return solid if solid.volume() > SMALLEST else None
+    if solid.volume() > SMALLEST:
+        return solid
+    return None
 
 
 def _is_closed(faces: Integers) -> bool:

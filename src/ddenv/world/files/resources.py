@@ -303,7 +303,9 @@ def fuel_model(uri: str) -> FuelModel | None:
     """
     scheme, rest = _decoded(uri)
     found = in_fuel(rest) if scheme in ("http", "https") else None
-    return None if found is None else found[0]
+    if found is None:
+        return None
+    return found[0]
 
 
 def how_to_fetch(uris: Iterable[str]) -> str:
@@ -497,6 +499,8 @@ def _newest_file(config: Element) -> str:
             newest = version
             name = own
     try:
-        return _inside(name) if name else ""
+        if name:
+            return _inside(name)
+        return ""
     except Unusable as error:
         raise Unusable(f"model.config: {error}") from None

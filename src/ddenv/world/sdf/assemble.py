@@ -192,7 +192,9 @@ def _check_has_link(part: Part, scope: Scope) -> None:
 
 
 def _is_static(part: Part) -> bool:
-    return truth(part.element, "static", False) if part.static is None else part.static
+    if part.static is None:
+        return truth(part.element, "static", False)
+    return part.static
 
 
 def _note_move(poses: list[LinkPose], saved: Saved, context: Context) -> None:
@@ -244,4 +246,6 @@ def _saved(model: Element, context: Context) -> Saved:
 
 def _pose(holder: Element) -> Pose | None:
     element = holder.find("pose")
-    return None if element is None or not text_of(element) else pose_of(element)
+    if element is None or not text_of(element):
+        return None
+    return pose_of(element)

@@ -214,12 +214,16 @@ class Context:
     def may_guess(self, uri: str) -> bool:
         """Whether the user wants a guessed shape for `uri`, which is missing."""
         key = matching(self.stand_ins, uri)
-        return ALL_MISSING in self.stand_ins if key is None else self.stand_ins[key] == AUTO
+        if key is None:
+            return ALL_MISSING in self.stand_ins
+        return self.stand_ins[key] == AUTO
 
 
 def _also(what: str, uris: Sequence[str]) -> str:
     """The end of a sentence that names other files."""
-    return f"; {what}: {first_of([repr(uri[:100]) for uri in uris], MOST_NAMED)}" if uris else ""
+    if uris:
+        return f"; {what}: {first_of([repr(uri[:100]) for uri in uris], MOST_NAMED)}"
+    return ""
 
 
 def sdf_root(text: bytes, path: Path) -> Element:

@@ -64,7 +64,9 @@ class Source:
 
     def scoped(self, name: str) -> str:
         """`name` with the namespace before it; `world` has none."""
-        return name if name == WORLD or not self.namespace else f"{self.namespace}::{name}"
+        if name == WORLD or not self.namespace:
+            return name
+        return f"{self.namespace}::{name}"
 
     def name_of(self, node: Node) -> str:
         """The name in a scalar, with the namespace before it. Raises UserError."""
@@ -73,7 +75,9 @@ class Source:
     def inner(self, keys: Mapping[str, Node]) -> str:
         """The namespace that `model_namespace` of a directive says. Raises UserError."""
         own = keys.get("model_namespace")
-        return self.namespace if own is None else self.name_of(own)
+        if own is None:
+            return self.namespace
+        return self.name_of(own)
 
     def bytes_of(self, span: Span) -> Span:
         """Byte positions in the encoded text for positions in the text."""

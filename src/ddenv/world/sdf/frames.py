@@ -151,16 +151,16 @@ class Scope:
                 element,
                 "the attribute 'frame' has no effect since SDF 1.7; use relative_to",
             )
-        return (
-            local
-            if base in OWN
-            else self.pose(base, holder if element is None else element) @ local
-        )
+        if base in OWN:
+            return local
+        return self.pose(base, holder if element is None else element) @ local
 
     def _by_placement_frame(self, part: Part, pose: Pose) -> Pose:
         """The pose of `part`, if `pose` is that of its placement frame."""
         frame = part.placement_frame
-        return pose @ self.inside(part).pose(frame, part.at).inverse() if frame else pose
+        if frame:
+            return pose @ self.inside(part).pose(frame, part.at).inverse()
+        return pose
 
     def link(self, name: str, asker: Element) -> str | None:
         """The link that the frame `name` of this model is attached to, such as `link` or
@@ -198,13 +198,17 @@ class Scope:
         named = self.element.get("canonical_link")
         first = self.element.find("link")
         if named:
-            return None if named in OWN else self.link(named, self.element)
+            if named in OWN:
+                return None
+            return self.link(named, self.element)
         if first is not None:
             return name_of(first)
         for part in self.parts:
             link = self.inside(part).canonical
             if link is not None:
-                return link if part.merged else f"{part.name}::{link}"
+                if part.merged:
+                    return link
+                return f"{part.name}::{link}"
         return None
 
     def references(self) -> set[str]:
@@ -254,11 +258,10 @@ def pose_of(element: Element) -> Pose:
         x, y, z, *angles = numbers(element, 6)
         in_degrees = element.get("degrees", "").strip().lower() in ("1", "true")
         scale = math.pi / 180 if in_degrees else 1.0
-        pose = (
-            Pose.from_rpy(x, y, z, *(angle * scale for angle in angles))
-            if any(angles)
-            else Pose((x, y, z))
-        )
+        if any(angles):
+            pose = Pose.from_rpy(x, y, z, *(angle * scale for angle in angles))
+        else:
+            pose = Pose((x, y, z))
     if max(abs(x), abs(y), abs(z)) > FARTHEST:
         raise TooFar(str(complain(element, f"is farther than {FARTHEST:g} m away")))
     return pose

@@ -78,7 +78,9 @@ class Lost:
     @property
     def problem(self) -> str:
         """What is wrong with it, to follow its name."""
-        return "is unreadable" if self.unreadable else "is not available"
+        if self.unreadable:
+            return "is unreadable"
+        return "is not available"
 
 
 def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed | Lost | None:
@@ -103,16 +105,10 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
         case "empty":
             return None
         case "heightmap" | "image" as tag:
-            seen = parent.tag == "visual"
-            if not seen and not context.ignores(tag):
-                return _terrain(element, context, scale)
-            why = (
-                f"a {tag} is not drawn"
-                if seen
-                else "left out by --ignore: nothing collides with it"
-            )
-            context.note("ignored", element, why)
-            return None
+            if parent.tag == "visual":
+                context.note("ignored", element, f"a {tag} is not drawn")
+                return None
+            return _terrain(element, context, scale)
         case "plane":
             return Placed(Plane(*_sizes(element)), _turned(element.find("normal")))
     return Placed(_scaled(_primitive(element), scale, element))
@@ -188,8 +184,12 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
     return Placed(_scaled(mesh, full, element))
 
 
-def _terrain(element: Element, context: Context, scale: Vector) -> Placed:
-    """The ground that a `<heightmap>` stands for. Raises UserError."""
+def _terrain(element: Element, context: Context, scale: Vector) -> Placed | None:
+    """The ground that a `<heightmap>` stands for; None if it is left out. Raises UserError."""
+    if context.ignores(element.tag):
+        why = "left out by --ignore: nothing collides with it"
+        context.note("ignored", element, why)
+        return None
     if element.tag == "image":
         raise refuse(element, "image", "an image is not supported: nothing would collide with it")
     uri = text_of(element.find("uri"))
@@ -287,11 +287,10 @@ def remedies(lost: Lost, siblings: Names) -> str:
     """
     # For model://barrel/meshes/barrel.dae name the model: one stand-in then covers all of its
     # meshes.
-    package = (
-        "/".join(lost.uri.split("/")[:3])
-        if lost.uri.startswith(("model://", "package://"))
-        else lost.uri
-    )
+    if lost.uri.startswith(("model://", "package://")):
+        package = "/".join(lost.uri.split("/")[:3])
+    else:
+        package = lost.uri
     others = ", ".join(f"{kind}:{sizes}" for kind, sizes in SIZES.items() if kind != "cylinder")
     also = "".join(
         f", or '{lost.uri[:200]}={kind}' for the box around its link's {kind} shapes"

@@ -41,7 +41,9 @@ class Part:
     def pose(self) -> Element | None:
         """The `<pose>` in force: an include's own overrides the model's."""
         given = self.at.find("pose")
-        return self.element.find("pose") if given is None else given
+        if given is None:
+            return self.element.find("pose")
+        return given
 
     @property
     def placement_frame(self) -> str:

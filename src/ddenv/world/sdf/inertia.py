@@ -158,7 +158,9 @@ def _possible(moments: Vector, products: Vector) -> Vector | None:
     if -1e-9 * high < excess < 1e-5 * high:
         moments = vector(moment + max(excess, 0.0) + 1e-9 * high for moment in moments)
         low, middle, high = _principal(moments, products)
-    return moments if low > LEAST_MOMENT and high <= low + middle else None
+    if low > LEAST_MOMENT and high <= low + middle:
+        return moments
+    return None
 
 
 def _principal(moments: Vector, products: Vector) -> Vector:

@@ -120,7 +120,9 @@ def _parts(model: Model, link: Link, element: Element) -> Iterator[Model]:
 def _mesh_or_number(numbered: tuple[int, Collision]) -> tuple[str, int]:
     """What the pieces of one `<collision>` have in common, and no others."""
     number, collision = numbered
-    return ("", number) if collision.piece is None else (collision.name, id(collision.piece.mesh))
+    if collision.piece is None:
+        return ("", number)
+    return (collision.name, id(collision.piece.mesh))
 
 
 def _emptied(
@@ -236,4 +238,6 @@ def _copies(
 
 
 def _joined(folder: str, uri: str) -> str:
-    return uri if "://" in uri else posixpath.join(folder, uri)
+    if "://" in uri:
+        return uri
+    return posixpath.join(folder, uri)

@@ -213,7 +213,9 @@ def _limit(limit: Element | None, tag: str, default: float) -> float:
         return default
     values = floats(child)
     value = values[0] if len(values) == 1 and math.isinf(values[0]) else numbers(child, 1)[0]
-    return math.copysign(math.inf, value) if abs(value) >= UNLIMITED else value
+    if abs(value) >= UNLIMITED:
+        return math.copysign(math.inf, value)
+    return value
 
 
 def check_tree(joints: list[Joint], element: Element) -> None:

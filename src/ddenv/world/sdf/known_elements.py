@@ -56,10 +56,14 @@ def fault(element: Element, known: Known) -> str:
             return f"a <{element.tag}> without its {attribute}"
     text = text_of(element)
     if not text:
-        return f"an empty <{element.tag}>" if known.required else ""
+        if known.required:
+            return f"an empty <{element.tag}>"
+        return ""
     if known.kind == "pose":
         count = 7 if element.get("rotation_format") == "quat_xyzw" else 6
-        return "" if _is_pose(text, count) else f"a <{element.tag}> that is not {count} numbers"
+        if _is_pose(text, count):
+            return ""
+        return f"a <{element.tag}> that is not {count} numbers"
     check = CHECKS.get(known.kind)
     if check is None or check[0](text):
         return ""

@@ -278,4 +278,6 @@ def read_color(visual: Element) -> Color | None:
             # ignored.
             return red, green, blue, ((alpha or [1.0])[0] or 1.0) * opacity
     name = text_of(visual.find("material/script/name")).removeprefix("Gazebo/")
-    return (*GAZEBO_COLORS[name], opacity) if name in GAZEBO_COLORS else None
+    if name in GAZEBO_COLORS:
+        return (*GAZEBO_COLORS[name], opacity)
+    return None

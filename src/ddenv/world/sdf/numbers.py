@@ -197,16 +197,26 @@ def _of_model(world: World, model: Model, what: str) -> float | None:
     """A number of a model; None if it has none of that kind, or if it does not stand in the world's
     own text.
     """
-    if what in ("x", "y", "z", "yaw"):
-        return model.pose.yaw() if what == "yaw" else model.pose.position["xyz".index(what)]
+    if what == "yaw":
+        return model.pose.yaw()
+    if what in ("x", "y", "z"):
+        return model.pose.position["xyz".index(what)]
     if not world.text.startswith(b"<model", model.spans[0][0]):
         return None
     if what == "friction":
         frictions = {one.mu for one in model.collisions}
         return frictions.pop() if len(frictions) == 1 else None
     if what == "mass":
-        inertia = model.links[0].inertia if len(model.links) == 1 and not model.static else None
-        return None if inertia is None else inertia.mass
+        return _mass(model)
+    return _size(model, what)
+
+
+def _mass(model: Model) -> float | None:
+    inertia = model.links[0].inertia if len(model.links) == 1 and not model.static else None
+    return None if inertia is None else inertia.mass
+
+
+def _size(model: Model, what: str) -> float | None:
     match [one.shape for one in model.collisions], what:
         case [Box(size)], "size_x" | "size_y" | "size_z":
             return size["xyz".index(what[-1])]

@@ -44,11 +44,9 @@ def parse_world(
     """
     context = Context(resources=resources or disk_of(path, reading), reading=reading)
     try:
-        return (
-            parse_directives(text, path, context)
-            if is_directives(path)
-            else _world(text, path, context)
-        )
+        if is_directives(path):
+            return parse_directives(text, path, context)
+        return _world(text, path, context)
     except UserError:
         # The error may only be a consequence of a missing file, such as a pose relative to a model
         # in it.
@@ -97,11 +95,10 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     worlds = root.findall("world")
     if len(worlds) != 1:
         found = "no <world>" if not worlds else f"{len(worlds)} <world> elements"
-        instead = (
-            f"; to use its model in a world, {how_to_include(path)}"
-            if root.find("model") is not None
-            else ""
-        )
+        if root.find("model") is not None:
+            instead = f"; to use its model in a world, {how_to_include(path)}"
+        else:
+            instead = ""
         raise UserError(f"{path}: expected one <world> inside <sdf>, found {found}{instead}")
     world = worlds[0]
     joint = world.find("joint")
@@ -136,7 +133,9 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         ),
     )
     whole = context.recorded(whole)
-    return _opened(whole, root, scope, context) if context.reading.inside else whole
+    if context.reading.inside:
+        return _opened(whole, root, scope, context)
+    return whole
 
 
 def _opened(world: World, root: Element, scope: Scope, context: Context) -> World:

@@ -111,11 +111,10 @@ def link_of(source: Element, robot: Element, context: Context) -> Element:
         made.append(twin(inertial, *parts))
     for tag in ("collision", "visual"):
         for count, part in enumerate(source.findall(tag)):
-            more = (
-                _surface(name_of(source), part, robot)
-                if tag == "collision"
-                else _material(part, robot)
-            )
+            if tag == "collision":
+                more = _surface(name_of(source), part, robot)
+            else:
+                more = _material(part, robot)
             own = part.get("name") or f"{tag}_{count}"
             made.append(twin(part, pose(part), _geometry(part, context), *more, name=own))
     return made
@@ -267,9 +266,8 @@ def pose(source: Element, relative_to: str = "") -> Element:
     """The `<pose>` for the `<origin>` in `source`. Raises UserError."""
     origin = source.find("origin")
     holder = source if origin is None else origin
-    words = (
-        "0 0 0 0 0 0"
-        if origin is None
-        else f"{three(origin, 'xyz', '0 0 0')} {three(origin, 'rpy', '0 0 0')}"
-    )
+    if origin is None:
+        words = "0 0 0 0 0 0"
+    else:
+        words = f"{three(origin, 'xyz', '0 0 0')} {three(origin, 'rpy', '0 0 0')}"
     return element("pose", holder, words, **({"relative_to": relative_to} if relative_to else {}))

@@ -365,7 +365,9 @@ class _Builder:
 
     def carrier(self, name: str) -> str:
         """The model that `name` is a part of: itself, unless it is welded to one that can move."""
-        return self.carriers[name][0] if name in self.carriers else name
+        if name in self.carriers:
+            return self.carriers[name][0]
+        return name
 
     def shared(self) -> Iterator[Shared]:
         """What of collision filter groups goes when all of some models are gone. Raises

@@ -34,7 +34,9 @@ def parse(text: bytes, path: Path, root: str = "") -> Element:
 def tag_end(text: bytes, element: Element) -> int:
     """Where the start tag of `element` ends in `text`, the content of its file."""
     found = _TAG_END.match(text, element.start)
-    return element.end if found is None else found.end()
+    if found is None:
+        return element.end
+    return found.end()
 
 
 def with_words(text: bytes, element: Element, words: str) -> Edit:
@@ -48,7 +50,9 @@ def with_words(text: bytes, element: Element, words: str) -> Edit:
 def with_child(text: bytes, holder: Element, new: str) -> Edit:
     """`holder` with new elements as its first ones."""
     end = tag_end(text, holder)
-    return with_words(text, holder, new) if end == holder.end else (end, end, new.encode())
+    if end == holder.end:
+        return with_words(text, holder, new)
+    return (end, end, new.encode())
 
 
 def edited(text: bytes, edits: Sequence[Edit]) -> bytes:
@@ -83,7 +87,9 @@ def complain(element: Element, message: str) -> UserError:
 
 def text_of(element: Element | None) -> str:
     """The text of `element` without surrounding white space; empty for None."""
-    return "" if element is None else (element.text or "").strip()
+    if element is None:
+        return ""
+    return (element.text or "").strip()
 
 
 def name_of(element: Element) -> str:
@@ -123,7 +129,9 @@ def number(parent: Element, tag: str, default: float) -> float:
     UserError.
     """
     child = parent.find(tag)
-    return default if child is None else numbers(child, 1)[0]
+    if child is None:
+        return default
+    return numbers(child, 1)[0]
 
 
 def number_or_nan(parent: Element, path: str, default: float = math.nan) -> float:
@@ -132,7 +140,9 @@ def number_or_nan(parent: Element, path: str, default: float = math.nan) -> floa
     """
     child = parent.find(path)
     values = (default,) if child is None else floats(child)
-    return values[0] if len(values) == 1 else math.nan
+    if len(values) == 1:
+        return values[0]
+    return math.nan
 
 
 def truth(parent: Element, tag: str, default: bool) -> bool:
