@@ -21,16 +21,16 @@ import numpy as np
 from long_run import world_of
 
 from ddenv.engine.__main__ import _begin
-from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
+from ddenv.engine.scheduler import TestScheduler
 from ddenv.engine.worker import Run, Start
 from ddenv.robot.result import RunResult
 from ddenv.robot.settled import Settled
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
-from ddenv.runs.subject import read_parts, scenario_for_world
+from ddenv.runs.experiment import read_parts, scenario_for_world
 
 SHORTEST, LONGEST = 20.0, 60.0  # s
 NEEDED = 3
@@ -109,7 +109,7 @@ def reduce(folder: Path, models: int, workers: int) -> tuple[Simulated, float, i
         journal = Journal(file)
         _begin(journal, workers, None)
         control = Control(journal, threading.Event(), time.time())
-        Driver(scenario, parsed, journal, Bench(journal, pool, control), control).reduce()
+        Driver(scenario, parsed, journal, TestScheduler(journal, pool, control), control).reduce()
         state, real = journal.state, time.perf_counter() - began
         return pool, real, len(state.environment), state.ahead
 

@@ -29,10 +29,10 @@ from ddenv.engine.judging import fix_failure
 from ddenv.evidence.rates import wilson_interval
 from ddenv.robot.oracle import Failure, ends_of, judge
 from ddenv.robot.result import Ends, RunResult
-from ddenv.robot.simulation.template import Variants
+from ddenv.robot.simulation.plant_cache import PlantCache
 from ddenv.runfile.state import Test
 from ddenv.runs import processor
-from ddenv.runs.subject import load_parts, reading_of, scenario_for_world, with_options
+from ddenv.runs.experiment import load_parts, reading_of, scenario_for_world, with_options
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Reduction, Scenario, seed_of
 
@@ -128,7 +128,7 @@ def tests(
 def prepare(scenario: Scenario) -> None:
     """Builds the world once in each process, as the engine's workers do."""
     global _simulator
-    _simulator = Variants(*load_parts(scenario), scenario)
+    _simulator = PlantCache(*load_parts(scenario), scenario)
 
 
 def full_run(keep: frozenset[str], seed: int) -> RunResult:

@@ -27,11 +27,11 @@ import numpy as np
 from long_run import ROBOT_SDF, world_of, write
 
 from ddenv import __version__
-from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool
+from ddenv.engine.scheduler import TestScheduler
 
 # Loads scikit-learn, which is part of the start.
 from ddenv.reduction import partitionings  # noqa: F401
@@ -39,8 +39,8 @@ from ddenv.robot.result import Ends, Progress, RunResult
 from ddenv.runfile.events import EngineStarted
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.experiment import read_parts, with_options
 from ddenv.runs.programs import start_engine
-from ddenv.runs.subject import read_parts, with_options
 from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
@@ -170,7 +170,7 @@ def work(run: Path, jobs: int, make: partial[Sleeper]) -> float:
             Control(journal, threading.Event()),
             Pool(scenario, world, robot, jobs, make),
         )
-        driver = Driver(scenario, world, journal, Bench(journal, pool, control), control)
+        driver = Driver(scenario, world, journal, TestScheduler(journal, pool, control), control)
         began = time.thread_time()
         with suppress(Stopped):
             driver.reduce()

@@ -18,9 +18,9 @@ from pathlib import Path
 
 from ddenv.evidence.rates import wilson_interval
 from ddenv.robot.result import RunResult
-from ddenv.robot.simulation.template import Template
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.runfile.failures import alike
-from ddenv.runs.subject import load_parts
+from ddenv.runs.experiment import load_parts
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import World
 from ddenv.world.sdf.read import parse_world
@@ -66,7 +66,7 @@ def runs(name: str, repaired: bool, seeds: range) -> list[RunResult]:
     world, robot = load_parts(scenario)
     if repaired:
         world = repaired_world(name)
-    template = Template(world, robot, scenario)
+    template = Plant(world, robot, scenario)
     return [template.run(frozenset(world.elements()), seed) for seed in seeds]
 
 

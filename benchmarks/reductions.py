@@ -30,8 +30,8 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.experiment import load_parts, with_options
 from ddenv.runs.programs import start_engine
-from ddenv.runs.subject import load_parts, with_options
 from ddenv.settings import SETTINGS
 from ddenv.study.plan import PAIRS
 from ddenv.world.load import SCENARIOS, load_scenario

@@ -23,8 +23,8 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 
 from ddenv.robot.piles.sleep import Sleep
-from ddenv.robot.simulation.template import Template, Variants
-from ddenv.runs.subject import load_parts, scenario_for_world
+from ddenv.robot.simulation.plant_cache import Plant, PlantCache
+from ddenv.runs.experiment import load_parts, scenario_for_world
 from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.scenario import Scenario
 
@@ -58,7 +58,7 @@ def main() -> None:
     print("|---|---|---|---|---|")
     for name, scenario in scenarios(arguments):
         world, robot = load_parts(scenario)
-        variants = Variants(world, robot, scenario)
+        variants = PlantCache(world, robot, scenario)
         elements = world.elements()
         for kept in (elements, elements[::2]):
             print(
@@ -80,7 +80,7 @@ def scenarios(arguments: argparse.Namespace) -> Iterator[tuple[str, Scenario]]:
     )
 
 
-def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:
+def row(template: Plant, name: str, keep: frozenset[str], seeds: int) -> str:
     template.run(keep, 0)
     simulated = spent = bare_spent = 0.0
     drive = template._drive
@@ -95,7 +95,7 @@ def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:
 
 
 def bare(
-    template: Template, keep: frozenset[str], speeds: list[np.ndarray], simulated: float
+    template: Plant, keep: frozenset[str], speeds: list[np.ndarray], simulated: float
 ) -> float:
     """CPU time (s) of simulating a run with these wheel speeds."""
     shared, period = template.context, template._clock.command_period

@@ -26,13 +26,13 @@ from small_worlds import KINDS, small_scenario, small_world
 
 from ddenv.environment import Environment
 from ddenv.evidence.slices import Ties
-from ddenv.robot.piles.rehearsal import Repertoire
+from ddenv.robot.piles.pile_simulator import PileCache
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
+from ddenv.robot.simulation.plant_cache import Plant, PlantCache
 from ddenv.robot.simulation.taking_part import Reached
-from ddenv.robot.simulation.template import Template, Variants
-from ddenv.runs.subject import load_parts, reading_of, scenario_for_world, with_options
+from ddenv.runs.experiment import load_parts, reading_of, scenario_for_world, with_options
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
@@ -43,9 +43,9 @@ FORGOTTEN = {
     "models": lambda: setattr(Reached, "_look_around_models", lambda *_: None),
     "awake": lambda: setattr(Sleep, "took_part", frozenset()),
     "lidar": lambda: setattr(Lidar, "took_part", {}),
-    "unusual": lambda: setattr(Repertoire, "unusual", lambda *_: frozenset()),
-    "carriers": lambda: setattr(Template, "_carriers", lambda *_: frozenset()),
-    "ties": lambda: setattr(Variants, "ties", lambda *_: []),
+    "unusual": lambda: setattr(PileCache, "unusual", lambda *_: frozenset()),
+    "carriers": lambda: setattr(Plant, "_carriers", lambda *_: frozenset()),
+    "ties": lambda: setattr(PlantCache, "ties", lambda *_: []),
 }
 # Implied tests of each run.
 PARTS = 6
@@ -136,7 +136,7 @@ def row(kind: str, worlds: Iterable[tuple[World, Model, Scenario]], tests: int, 
     """Prints the row of one kind of world. Returns how many of its implied tests differ."""
     found, began = Count(), time.process_time()
     for world, robot, scenario in worlds:
-        audit(Variants(world, robot, scenario), frozenset(world.elements()), tests, first, found)
+        audit(PlantCache(world, robot, scenario), frozenset(world.elements()), tests, first, found)
     found.seconds = time.process_time() - began
     print(
         (
@@ -149,7 +149,7 @@ def row(kind: str, worlds: Iterable[tuple[World, Model, Scenario]], tests: int, 
 
 
 def audit(
-    simulator: Variants, everything: frozenset[str], tests: int, first: int, found: Count
+    simulator: PlantCache, everything: frozenset[str], tests: int, first: int, found: Count
 ) -> None:
     """Simulates implied tests in one world, and counts them in `found`."""
     chance = random.Random(first)

@@ -25,9 +25,9 @@ from unittest.mock import patch
 from textual.pilot import Pilot
 from textual.widgets import Select
 
-from ddenv.guiding.offers import nearest_other
+from ddenv.guiding.key_offers import nearest_other
+from ddenv.learn.catalog import bundled, open_lesson
 from ddenv.learn.score import Score
-from ddenv.learn.shelf import bundled, open_lesson
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState

@@ -25,7 +25,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.position import position_in
 from ddenv.runfile.state import partition_letter
 from ddenv.runfile.store import COLUMNS, RunFile
-from ddenv.runs.subject import read_parts
+from ddenv.runs.experiment import read_parts
 from ddenv.world.access import write_file
 from ddenv.world.extent import center
 

@@ -301,7 +301,7 @@ def test_a_mistake_gets_one_line_and_leaves_nothing(home, monkeypatch, words, to
 @pytest.mark.usefixtures("started")
 def test_options_on_the_reduction_reach_the_run(home):
     from ddenv.cli.command_line import app
-    from ddenv.runs.subject import read_parts, with_options
+    from ddenv.runs.experiment import read_parts, with_options
 
     options = {
         "pair": "trajectoryseg/timestep",

@@ -22,7 +22,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 
 from ddenv.cli.fetch import fetch_with_bar
 from ddenv.errors import UserError
-from ddenv.runs.subject import load_parts, scenario_for_world, scenario_named
+from ddenv.runs.experiment import load_parts, scenario_for_world, scenario_named
 from ddenv.world.files import fuel_download
 from ddenv.world.files.fuel import CACHES, HOSTS
 from ddenv.world.files.roots import VARIABLES

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from ddenv.learn.shelf import LESSONS
+from ddenv.learn.catalog import LESSONS
 from tests.command import ddenv
 from tests.conftest import DATA
 from tests.tiers import slow

@@ -14,7 +14,7 @@ from ddenv.robot.external.simulator import COLUMNS, EXPECTED, TOO_LARGE, Externa
 from ddenv.robot.external.supervise import GRACE
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.runs.subject import load_parts
+from ddenv.runs.experiment import load_parts
 from ddenv.world.command import PLACEHOLDERS
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Oracle

@@ -8,7 +8,7 @@ import re
 import pytest
 
 from ddenv.robot.external.python_simulator import PythonSimulator
-from ddenv.runs.subject import load_parts
+from ddenv.runs.experiment import load_parts
 from ddenv.world.load import load_scenario
 from tests.command import ddenv
 from tests.conftest import ROOT

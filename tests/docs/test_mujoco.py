@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from ddenv.robot.external.python_simulator import PythonSimulator
-from ddenv.robot.simulation.template import Template
-from ddenv.runs.subject import load_parts
+from ddenv.robot.simulation.plant_cache import Template
+from ddenv.runs.experiment import load_parts
 from ddenv.world.drive import find_drive
 from ddenv.world.load import SDF, load_scenario, load_simulator
 from ddenv.world.model import (

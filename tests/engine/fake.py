@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ddenv.engine.__main__ import _begin
-from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, DiskSpace
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
+from ddenv.engine.scheduler import TestScheduler
 from ddenv.engine.shared import Key, Place
 from ddenv.engine.worker import Broken, Run, Start
 from ddenv.robot.result import RunResult
@@ -25,7 +25,7 @@ from ddenv.robot.settled import Settled
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.creation import create_run
-from ddenv.runs.subject import read_parts
+from ddenv.runs.experiment import read_parts
 from ddenv.settings import PRINTED
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
@@ -168,7 +168,7 @@ class Engine(NamedTuple):
     scenario: Scenario
     world: World
     journal: Journal
-    bench: Bench
+    scheduler: TestScheduler
     control: Control
 
     @property
@@ -196,13 +196,15 @@ def engine(
         _begin(journal, pool.jobs, accept_mode)
         prepare(file)
         control = Control(journal, terminated or threading.Event(), time.time(), disk, attended)
-        yield Engine(scenario, world, journal, Bench(journal, pool, control, others), control)
+        yield Engine(
+            scenario, world, journal, TestScheduler(journal, pool, control, others), control
+        )
 
 
 def drive(path: Path, pool: FakePool, mixed: bool = False, **options) -> RunState:
     """Works on a run to its end; `options` are those of `engine`."""
     with engine(path, pool, **options) as one:
-        one.bench.check_repeats(mixed)
+        one.scheduler.check_repeats(mixed)
         one.driver.reduce()
         return one.journal.state
 

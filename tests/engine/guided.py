@@ -13,7 +13,7 @@ from tests.engine.fake import ELEMENTS, FakePool, drive
 def at_once(monkeypatch):
     """Nobody waits for the user to come to rest."""
     monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
-    monkeypatch.setattr("ddenv.engine.bench.WAIT", 0.0)
+    monkeypatch.setattr("ddenv.engine.scheduler.WAIT", 0.0)
 
 
 class Guided(FakePool):

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from ddenv.engine.bench import MOST_BROKEN
 from ddenv.engine.pool import Pool
+from ddenv.engine.scheduler import MOST_BROKEN
 from ddenv.engine.worker import Run
 from ddenv.errors import UserError
 from ddenv.runs.creation import create_run
+from ddenv.runs.experiment import load_parts
 from ddenv.runs.programs import start_engine
-from ddenv.runs.subject import load_parts
 from ddenv.runs.trust import program_of, trust
 from ddenv.world.scenario import Scenario
 from tests.engine.reading import events, send, state_of

@@ -10,7 +10,7 @@ from ddenv.cli.test import line
 from ddenv.engine.single_test import plan, run_trials
 from ddenv.runfile.events import EarlyStopEnded
 from ddenv.runfile.store import RunFile
-from ddenv.runs.subject import read_subject
+from ddenv.runs.experiment import read_subject
 from ddenv.words.early_stop import why_off
 from ddenv.words.news import NEWS
 from tests.engine.fake import FakePool, drive, new_run

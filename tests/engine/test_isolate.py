@@ -35,7 +35,7 @@ def work(path, pool, prepare=lambda _: None, at_least=None):
     """Isolates as the engine program does, in this process."""
     before = state_of(path).reason
     with engine(path, pool, prepare=prepare) as one:
-        isolate(one.world, one.journal, one.bench, at_least, before)
+        isolate(one.world, one.journal, one.scheduler, at_least, before)
         return one.journal.state
 
 

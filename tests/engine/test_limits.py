@@ -27,7 +27,7 @@ from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.creation import create_run
-from ddenv.runs.subject import read_parts
+from ddenv.runs.experiment import read_parts
 from ddenv.settings import SETTINGS
 from ddenv.words.news import news
 from tests.engine.fake import FakePool, drive, new_run

@@ -19,9 +19,9 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.store import RunFile
 from ddenv.runs.changes import beside, changed_run, changes
 from ddenv.runs.creation import create_run
+from ddenv.runs.experiment import load_parts, read_parts
 from ddenv.runs.export import export_world
 from ddenv.runs.playback import played
-from ddenv.runs.subject import load_parts, read_parts
 from ddenv.words.margins import lines
 from ddenv.world.load import load_scenario
 from tests.engine.fake import FakePool, drive, engine, new_run

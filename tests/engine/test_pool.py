@@ -12,7 +12,7 @@ import pytest
 from ddenv.engine.pool import PREPARATION, Pool
 from ddenv.engine.worker import PERIOD, Broken, Moment, Run, answered
 from ddenv.errors import UserError
-from ddenv.runs.subject import load_parts
+from ddenv.runs.experiment import load_parts
 from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
 from tests.waiting import wait_until

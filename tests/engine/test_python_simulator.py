@@ -8,7 +8,7 @@ import pytest
 
 from ddenv.engine.pool import Pool
 from ddenv.engine.worker import Broken, Run
-from ddenv.runs.subject import load_parts
+from ddenv.runs.experiment import load_parts
 from ddenv.world.scenario import Oracle
 from tests.engine.test_pool import result
 from tests.waiting import wait_until

@@ -7,7 +7,7 @@ import pytest
 from ddenv.engine.control import Stopped
 from ddenv.engine.single_test import plan
 from ddenv.runfile.store import RunFile
-from ddenv.runs.subject import open_subject, read_subject
+from ddenv.runs.experiment import open_experiment, read_subject
 from ddenv.world.scenario import Reduction, seed_of
 from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
@@ -62,5 +62,5 @@ def test_seeds_that_the_user_types_count_up():
     given = dict.fromkeys(("spawn", "goal", "world", "timeout")) | dict.fromkeys(
         ("model_path", "stand_in", "ignore"), ()
     )
-    subject = open_subject(str(DATA / "wall.yaml"), given)
+    subject = open_experiment(str(DATA / "wall.yaml"), given)
     assert [trial.seed for trial in plan(subject, seed=5, repeat=3)] == [5, 6, 7]

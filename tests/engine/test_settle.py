@@ -4,7 +4,7 @@ where the user asks for it.
 
 import pytest
 
-from ddenv.engine import bench
+from ddenv.engine import scheduler
 from ddenv.engine.journal import Journal
 from ddenv.engine.notes import note_start
 from ddenv.engine.worker import Broken
@@ -14,7 +14,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import stacks
 from ddenv.runs.creation import create_run
-from ddenv.runs.subject import read_parts
+from ddenv.runs.experiment import read_parts
 from ddenv.words.news import news
 from ddenv.world.load import load_scenario
 from ddenv.world.pose import Pose
@@ -107,7 +107,7 @@ def test_a_world_where_nothing_moves_needs_none(tmp_path):
 
 
 def test_it_shows_that_it_takes_long(tmp_path, world, monkeypatch):
-    monkeypatch.setattr(bench, "PATIENCE", 0.0)
+    monkeypatch.setattr(scheduler, "PATIENCE", 0.0)
     path, slow = new_run(tmp_path, world=world), pool(needs("wall"))
     slow.settling = 3
     assert not drive(path, slow).settling

@@ -12,7 +12,7 @@ import pytest
 from ddenv.engine import shared
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
-from ddenv.runs.subject import read_parts
+from ddenv.runs.experiment import read_parts
 from ddenv.world.scenario import Controller, Oracle, Sensors
 from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run

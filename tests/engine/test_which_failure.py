@@ -9,7 +9,7 @@ from ddenv.engine.notes import note_start
 from ddenv.errors import UserError
 from ddenv.evidence.claims import is_minimal
 from ddenv.runfile.store import RunFile
-from ddenv.runs.subject import read_subject
+from ddenv.runs.experiment import read_subject
 from ddenv.words.claims import verdict_on
 from ddenv.words.explain import _offered
 from ddenv.world.scenario import Oracle

@@ -17,10 +17,10 @@ from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
 from ddenv.guiding.commands import (
     KINDS,
+    Context,
     GoBack,
     Pause,
     Resume,
-    Situation,
     StartEngine,
     Step,
     Stop,
@@ -30,7 +30,7 @@ from ddenv.guiding.commands import (
     send,
     written,
 )
-from ddenv.guiding.offers import ACTIONS, Pointed, offer
+from ddenv.guiding.key_offers import ACTIONS, Pointed, offer
 from ddenv.runfile.store import RunFile
 from ddenv.workbench.run.run_keys import GUIDING
 from ddenv.workbench.run.run_screen import RunScreen
@@ -141,7 +141,7 @@ def test_the_engine_obeys_what_the_rules_allow_and_refuses_the_rest_in_their_wor
             control = Control(journal, threading.Event())
             for kind, data in asked:
                 before = journal.state
-                why = refusal(parse(kind, data), Situation(before))
+                why = refusal(parse(kind, data), Context(before))
                 command = file.send(kind, **data)
                 control.poll()
                 after = journal.state
@@ -175,12 +175,12 @@ def test_what_a_key_offers_is_what_the_engine_obeys(salt, plan, moment, models, 
                 rows[row % len(rows)], follows, tuple(name for name in ELEMENTS if name in models)
             )
             for action in ACTIONS:
-                offered = offer(action, Situation(state), pointed)
+                offered = offer(action, Context(state), pointed)
                 if offered.command is None or isinstance(offered.command, StartEngine):
                     continue
                 assert not offered.why_not
                 journal = Journal(file)
-                if offer(action, Situation(journal.state), pointed) != offered:
+                if offer(action, Context(journal.state), pointed) != offered:
                     continue
                 command = send(file, offered.command)
                 Control(journal, threading.Event()).poll()
@@ -198,7 +198,7 @@ def test_the_footer_offers_what_the_rules_allow(salt, plan, moment, models, engi
     with tempfile.TemporaryDirectory() as folder:
         with RunFile(begun(folder, salt, plan, moment, "automatic")) as file:
             state = Journal(file).state
-        now = Situation(state, engine, barred)
+        now = Context(state, engine, barred)
         said, pointed = {}, Pointed(models=tuple(models))
         footer = SimpleNamespace(say=said.__setitem__, is_attached=True)
         screen = SimpleNamespace(

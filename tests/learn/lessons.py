@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import cache
 
+from ddenv.learn.catalog import LESSONS, Opened, bundled, open_lesson
 from ddenv.learn.lesson import Answer, Question
 from ddenv.learn.lesson_course import Course
 from ddenv.learn.score import Score
-from ddenv.learn.shelf import LESSONS, Opened, bundled, open_lesson
 
 FILES = bundled()
 # Stands for a search of one's own.

@@ -7,9 +7,9 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import IN_TURN, Pairs
 from ddenv.learn.attempt import read_oracle
+from ddenv.learn.catalog import LESSONS
 from ddenv.learn.lesson_figures import OF_RUN, Figures
 from ddenv.learn.reading import Places
-from ddenv.learn.shelf import LESSONS
 from ddenv.runfile.position import position_in
 from ddenv.runfile.store import RunFile
 from ddenv.text import percent_at_least, percent_at_most

@@ -12,10 +12,10 @@ from docs.lessons import delivery, quay, toys
 
 from ddenv.evidence.rates import wilson_interval
 from ddenv.learn.attempt import read_oracle
+from ddenv.learn.catalog import LESSONS
 from ddenv.learn.handout import handout
 from ddenv.learn.lesson import Answer
 from ddenv.learn.score import Score, score_of, summary
-from ddenv.learn.shelf import LESSONS
 from ddenv.page.html import html
 from ddenv.runfile.position import position_in
 from ddenv.runfile.store import RunFile

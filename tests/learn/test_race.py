@@ -12,6 +12,7 @@ from docs.lessons.record_plays import record_plays
 
 from ddenv.errors import UserError
 from ddenv.learn.attempt import RecordedRound, read_oracle
+from ddenv.learn.catalog import LESSONS
 from ddenv.learn.race import (
     KINDS,
     Play,
@@ -24,7 +25,6 @@ from ddenv.learn.race import (
     spent,
     why,
 )
-from ddenv.learn.shelf import LESSONS
 from ddenv.runfile.store import RunFile
 from tests.learn.lessons import RUNS, opened
 

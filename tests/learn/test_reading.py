@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from ddenv.errors import UserError
 from ddenv.learn import lesson_figures
-from ddenv.learn.shelf import LESSONS, open_lesson, write_template
+from ddenv.learn.catalog import LESSONS, open_lesson, write_template
 
 GOOD = """\
 title: A title

@@ -8,8 +8,8 @@ from pathlib import Path
 from shutil import copy
 from tempfile import mkdtemp
 
+from ddenv.learn.catalog import LESSONS, bundled, open_lesson
 from ddenv.learn.handout import handout
-from ddenv.learn.shelf import LESSONS, bundled, open_lesson
 from ddenv.page.html import html
 from ddenv.report.report import write_report
 from ddenv.runfile.store import RunFile

@@ -196,7 +196,7 @@ class Driver:
         self.legs.append((leg, deepcopy(self.now), len(self.facts)))
         return leg
 
-    next_leg = leg
+    start_search = leg
 
     def drive(self, work, most=None):
         """Carries it to its end, and returns what it returns; None if it was killed, or after

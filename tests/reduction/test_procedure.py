@@ -120,11 +120,11 @@ def test_where_a_decision_ends_a_search_it_goes_on_with_another(world, part, wor
     driver = Driver(world, workers)
     driver.interrupt = max(1, int(part * whole.steps)), Changed()
 
-    def next_leg():
+    def start_search():
         decided.append(driver.leg())
         return decided[-1]
 
-    decided, driver.next_leg = [], next_leg
+    decided, driver.start_search = [], start_search
     try:
         end = driver.drive(begun(driver))
     except Changed:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ddenv.robot.result import RunResult
-from ddenv.robot.simulation.template import Template
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.world.load import SCENARIOS, SDF, load_scenario, validate
 from ddenv.world.model import Box, Collision, Inertia, Joint, Link, Mesh, Model, Shape, World
 from ddenv.world.pose import Pose, Vector
@@ -121,7 +121,7 @@ def door(name: str, x: float, y: float, **changes: object) -> Model:
     )
 
 
-def run(template: Template, *names: str, seed: int = 1) -> RunResult:
+def run(template: Plant, *names: str, seed: int = 1) -> RunResult:
     return template.run(frozenset(names), seed)
 
 
@@ -210,5 +210,5 @@ def ditch_world(ditch_scenario: Scenario) -> World:
 
 
 @pytest.fixture(scope="session")
-def ditch(ditch_world: World, husky: Model, ditch_scenario: Scenario) -> Template:
-    return Template(ditch_world, husky, ditch_scenario)
+def ditch(ditch_world: World, husky: Model, ditch_scenario: Scenario) -> Plant:
+    return Plant(ditch_world, husky, ditch_scenario)

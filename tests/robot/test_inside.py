@@ -4,8 +4,8 @@ import random
 
 import pytest
 
-from ddenv.robot.simulation.template import Variants
-from ddenv.runs.subject import load_parts, scenario_for_world, with_options
+from ddenv.robot.simulation.plant_cache import PlantCache
+from ddenv.runs.experiment import load_parts, scenario_for_world, with_options
 from ddenv.world.scenario import Reading
 
 GROUND = (
@@ -42,7 +42,7 @@ def opened(tmp_path_factory):
 def simulators(opened):
     """Of the whole yard, and of its parts."""
     whole = with_options(opened, reading=Reading())
-    return Variants(*load_parts(whole), whole), Variants(*load_parts(opened), opened)
+    return PlantCache(*load_parts(whole), whole), PlantCache(*load_parts(opened), opened)
 
 
 PARTS = frozenset(
@@ -73,6 +73,6 @@ def test_parts_that_cannot_have_affected_a_run_change_no_bit_of_it(simulators):
 def test_a_protected_model_stays_with_all_its_parts(simulators, opened):
     _, parts = simulators
     protected = opened.model_copy(update={"protected": ("yard",)})
-    assert bits(Variants(*load_parts(opened), protected).run(frozenset(), 1)) == bits(
+    assert bits(PlantCache(*load_parts(opened), protected).run(frozenset(), 1)) == bits(
         parts.run(PARTS, 1)
     )

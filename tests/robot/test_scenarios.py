@@ -17,9 +17,9 @@ import pytest
 
 from ddenv.robot.oracle import Failure, judge
 from ddenv.robot.result import RunResult
-from ddenv.robot.simulation.template import Template
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.runfile.failures import alike
-from ddenv.runs.subject import load_parts
+from ddenv.runs.experiment import load_parts
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import Box, Model, World
 from ddenv.world.scenario import Scenario
@@ -69,9 +69,9 @@ class Part:
     robot: Model
 
     @cached_property
-    def template(self) -> Template:
+    def template(self) -> Plant:
         """The world in the simulator."""
-        return Template(self.world, self.robot, self.scenario)
+        return Plant(self.world, self.robot, self.scenario)
 
     @property
     def everything(self) -> frozenset[str]:
@@ -137,7 +137,7 @@ def test_the_robot_fails_in_the_same_place_at_a_stable_rate(name):
 def test_it_reaches_its_goal_where_the_cause_is_taken_away(name, script):
     scenario = part(name).scenario
     world = parse_world(script(name)[name](repaired=True).encode(), Path("repaired"))
-    template = Template(world, part(name).robot, scenario)
+    template = Plant(world, part(name).robot, scenario)
     results = [template.run(frozenset(world.elements()), seed) for seed in range(REPAIRED_SEEDS)]
     assert {result.outcome for result in results} == {"pass"}
     assert max(result.simulated_seconds for result in results) < 45.0
@@ -181,7 +181,7 @@ def test_a_used_context_gives_the_same_bits_as_a_fresh_one(name):
     first, template = bits_of_few(name), part(name).template
     template.run(frozenset(MINIMAL[name]), seed=6)
     assert bits(template.run(few(name), seed=5)) == first
-    fresh = Template(part(name).world, part(name).robot, part(name).scenario)
+    fresh = Plant(part(name).world, part(name).robot, part(name).scenario)
     assert bits(fresh.run(few(name), seed=5)) == first
 
 
@@ -191,7 +191,7 @@ def test_switching_models_off_gives_the_same_bits_as_building_without_them(name)
     smaller = replace(
         world, models=tuple(one for one in world.models if one.name in few(name) | {"ground_plane"})
     )
-    template = Template(smaller, part(name).robot, part(name).scenario)
+    template = Plant(smaller, part(name).robot, part(name).scenario)
     assert bits(template.run(few(name), seed=5)) == bits_of_few(name)
 
 

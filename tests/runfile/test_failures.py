@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.environment import Environment
-from ddenv.runfile.deeds import named
+from ddenv.runfile.failure_words import named
 from ddenv.runfile.failures import CHUNK, alike, atlas, grouped
 from ddenv.runfile.state import RunState, Test
 from tests.engine.fake import new_run

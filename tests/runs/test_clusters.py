@@ -5,8 +5,8 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.runs import trust
 from ddenv.runs.creation import create_run
+from ddenv.runs.experiment import with_options
 from ddenv.runs.programs import how_to_install
-from ddenv.runs.subject import with_options
 from ddenv.runs.trust import check_trusted, trust_cluster
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA

@@ -7,14 +7,14 @@ import shutil
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.guiding.commands import Situation, Try
+from ddenv.guiding.commands import Context, Try
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import stack_with, stacks_of
 from ddenv.runs.creation import create_run
+from ddenv.runs.experiment import load_parts, read_parts, scenario_for_world
 from ddenv.runs.export import export_world
 from ddenv.runs.folder import named_file
-from ddenv.runs.subject import load_parts, read_parts, scenario_for_world
 from ddenv.world.load import load_scenario
 from tests.runs.test_export import _reduce, box
 
@@ -65,7 +65,7 @@ def test_a_selection_by_hand_does_not_part_what_is_welded(hall):
     run = run_of(hall)
     _reduce(run, ["table", "lamp"])
     with RunFile(run) as file:
-        now = Situation(fold(file.events()))
+        now = Context(fold(file.events()))
     assert "lamp is welded to table" in Try((1,)).refusal(now)
     assert "welded" not in Try((0, 2)).refusal(now)
 

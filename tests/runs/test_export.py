@@ -7,12 +7,18 @@ import sys
 import pytest
 import yaml
 
-from ddenv.robot.piles import rehearsal
-from ddenv.robot.simulation.template import Variants
+from ddenv.robot.piles import pile_simulator
+from ddenv.robot.simulation.plant_cache import PlantCache
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.experiment import (
+    load_parts,
+    read_parts,
+    reading_of,
+    scenario_for_world,
+    with_options,
+)
 from ddenv.runs.export import export_world
-from ddenv.runs.subject import load_parts, read_parts, reading_of, scenario_for_world, with_options
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import PLAIN
 from tests.conftest import ROOT
@@ -248,14 +254,14 @@ def test_the_robot_does_the_same_in_what_was_written_as_in_the_reduction(
 ):
     models, keep = PARTS[parts]
     # How a ball rolls is found out for so long, shared by all of them.
-    monkeypatch.setattr(rehearsal, "BUDGET", 5.0)
+    monkeypatch.setattr(pile_simulator, "BUDGET", 5.0)
     run = run_of(tmp_path, models, keep=keep)
     export_world(run, folder / "m.sdf", folder / "m.yaml")
     with RunFile(run) as file:
         scenario, *parts = read_parts(file)
     there = load_scenario(folder / "m.yaml")
-    one = Variants(*parts, scenario).run(frozenset(keep), seed=1)
-    two = Variants(*load_parts(there), there).run(frozenset(keep), seed=1)
+    one = PlantCache(*parts, scenario).run(frozenset(keep), seed=1)
+    two = PlantCache(*load_parts(there), there).run(frozenset(keep), seed=1)
     assert (one.failure, one.trajectory.tobytes()) == (two.failure, two.trajectory.tobytes())
     assert {name: rows.tobytes() for name, rows in one.motions.items()} == {
         name: rows.tobytes() for name, rows in two.motions.items()

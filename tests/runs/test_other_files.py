@@ -5,8 +5,7 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
-from ddenv.runs.export import export_world
-from ddenv.runs.subject import (
+from ddenv.runs.experiment import (
     load_parts,
     read_parts,
     reading_of,
@@ -14,6 +13,7 @@ from ddenv.runs.subject import (
     scenario_named,
     with_options,
 )
+from ddenv.runs.export import export_world
 from ddenv.world.load import load_scenario
 from ddenv.world.model import Cylinder, Mesh
 from tests.runs.test_export import TETRAHEDRON

@@ -14,9 +14,9 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.reasons import (
     APART,
     GOAL,
+    Divergence,
     End,
     F,
-    Parting,
     parted,
     parting_sentence,
     reasons,
@@ -109,7 +109,7 @@ def test_trajectories_part_where_they_first_differ_by_more_than_a_tenth_of_a_met
 
 def test_it_says_when_the_robot_met_the_model_and_nothing_where_no_pair_shows_it(found):
     one = found[1][0]
-    met = Parting(
+    met = Divergence(
         with_test=1,
         without_test=2,
         seed=7,

@@ -15,7 +15,7 @@ import pytest
 
 from ddenv.runfile.store import Motions, RunFile
 from ddenv.runs.creation import create_run
-from ddenv.runs.subject import scenario_for_world
+from ddenv.runs.experiment import scenario_for_world
 from ddenv.world.sdf.read import parse_world
 from tests.shorthand import Writing
 

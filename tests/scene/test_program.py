@@ -28,7 +28,7 @@ from ddenv.runfile.reading import plain
 from ddenv.runfile.store import Live
 from ddenv.runfile.tested import Wanted
 from ddenv.runs import programs
-from ddenv.runs.remembered import state_file
+from ddenv.runs.preferences import state_file
 from ddenv.scene import server
 from tests.tiers import slow
 from tests.waiting import PATIENCE, wait_until

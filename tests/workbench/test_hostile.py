@@ -183,7 +183,7 @@ async def test_an_engine_that_hangs_is_told(run, monkeypatch):
     async with Attached(run) as session:
         await session.press("space")
         assert "no answer" not in session.screen.asking.waiting_for()
-        monkeypatch.setattr("ddenv.workbench.run.asking.PATIENCE", 0)
+        monkeypatch.setattr("ddenv.workbench.run.command_sender.PATIENCE", 0)
         assert session.screen.asking.waiting_for().startswith("pause: no answer for")
 
 

@@ -7,7 +7,7 @@ import sys
 import fake_moments
 import pytest
 
-from ddenv.guiding.offers import ACTIONS
+from ddenv.guiding.key_offers import ACTIONS
 from ddenv.workbench.line_mode import GUIDES, QUESTIONS, LineMode
 from ddenv.workbench.run.run_keys import GUIDING
 

@@ -2,16 +2,16 @@
 
 import fake_moments
 
-from ddenv.guiding.commands import Situation, written
-from ddenv.guiding.offers import Pointed, offer
+from ddenv.guiding.commands import Context, written
+from ddenv.guiding.key_offers import Pointed, offer
 
 
 def why_not(action, state, row=None, models=()):
-    return offer(action, Situation(state), Pointed(row, models=tuple(models))).why_not
+    return offer(action, Context(state), Pointed(row, models=tuple(models))).why_not
 
 
 def meant(action, state, row=None, models=()):
-    return written(offer(action, Situation(state), Pointed(row, models=tuple(models))).command)
+    return written(offer(action, Context(state), Pointed(row, models=tuple(models))).command)
 
 
 def test_what_a_means_for_a_try(run):
@@ -26,7 +26,7 @@ def test_what_a_means_for_a_try(run):
     state = run.state
     assert "lacks crate_00, which is pinned" in why_not("accept", state, state.trials[2])
     run.write("unpinned", models=[0])
-    now = Situation(run.state)
+    now = Context(run.state)
     assert [offer("accept", now, Pointed(row)).words for row in now.state.trials] == [
         "",
         "count as f",
@@ -57,9 +57,9 @@ def test_what_the_cursor_only_follows_is_not_accepted(run):
     run.test(0, "other", 2.0, 0, "tipped over")
     state = run.state
     followed = Pointed(state.round.candidates[0], follows=True)
-    assert "nothing to accept" in offer("accept", Situation(state), followed).why_not
+    assert "nothing to accept" in offer("accept", Context(state), followed).why_not
     run.write("paused")
-    assert offer("accept", Situation(run.state), followed).words == "count as f"
+    assert offer("accept", Context(run.state), followed).words == "count as f"
 
 
 def test_models_that_cannot_be_pinned_or_tried(run):

@@ -12,8 +12,8 @@ from test_explain_algorithms import leave_out
 from textual.widgets import Input
 from textual.worker import WorkerCancelled
 
+from ddenv.learn.catalog import bundled, open_lesson
 from ddenv.learn.score import Score
-from ddenv.learn.shelf import bundled, open_lesson
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import keep_score
 from ddenv.workbench.learn.lessons_screen import LessonsScreen

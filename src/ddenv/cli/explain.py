@@ -84,7 +84,7 @@ def isolate_command(
     name or a file) as it takes for the robot to reach its goal. It changes nothing else.
     """
     from ddenv.cli.follow import Interrupted, follow
-    from ddenv.guiding.commands import Isolate, Situation
+    from ddenv.guiding.commands import Context, Isolate
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.programs import start_engine
@@ -98,7 +98,7 @@ def isolate_command(
             )
         follow(path, start_engine(path, 1, give_up="yes"), as_json)
         return 0
-    if why := Isolate(again=True).refusal(Situation(state, "absent")):
+    if why := Isolate(again=True).refusal(Context(state, "absent")):
         raise UserError(f"{path}: {why}: ddenv resume {attach_name(path)}")
     if state.isolated is None or state.isolating is not None or again or runs is not None:
         try:
@@ -169,8 +169,8 @@ def margins_command(
     from ddenv.evidence.margins import fixes_of
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
+    from ddenv.runs.experiment import read_parts
     from ddenv.runs.programs import last_words, start_engine
-    from ddenv.runs.subject import read_parts
     from ddenv.words.margins import lines, rows
 
     path, state = idle_run(run, trust, cluster)

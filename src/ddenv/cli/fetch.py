@@ -12,7 +12,7 @@ from ddenv.cli.terminal import announce
 from ddenv.text import printable
 
 if TYPE_CHECKING:
-    from ddenv.runs.subject import Parse
+    from ddenv.runs.experiment import Parse
     from ddenv.world.files.fuel import FuelModel
     from ddenv.world.files.fuel_download import Shown
     from ddenv.world.scenario import Reading

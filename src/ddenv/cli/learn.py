@@ -54,7 +54,7 @@ def learn_command(
     LESSON is a number, a name or a file; with a run, that run is shown step by step. 'ddenv learn'
     alone shows the list.
     """
-    from ddenv.learn.shelf import open_lesson, write_template
+    from ddenv.learn.catalog import open_lesson, write_template
 
     given = {
         "list": given["listed"],
@@ -91,7 +91,7 @@ def learn_command(
 
 
 def _list() -> None:
-    from ddenv.learn.shelf import bundled, glance
+    from ddenv.learn.catalog import bundled, glance
     from ddenv.workbench.learn.kept_scores import all_scores, in_words
 
     scores = all_scores()
@@ -121,8 +121,8 @@ def _race(names: list[str]) -> int:
 
 
 def _page(name: str | None, file: Path) -> None:
+    from ddenv.learn.catalog import find_lesson, open_lesson
     from ddenv.learn.handout import handout
-    from ddenv.learn.shelf import find_lesson, open_lesson
     from ddenv.page.html import html
     from ddenv.world.access import write_file
 
@@ -140,7 +140,7 @@ def _page(name: str | None, file: Path) -> None:
 
 
 def _open(name: str | None) -> int:
-    from ddenv.learn.shelf import find_lesson, open_lesson
+    from ddenv.learn.catalog import find_lesson, open_lesson
     from ddenv.workbench.launch import run_workbench
 
     lesson = None if name is None else find_lesson(name)

@@ -60,10 +60,10 @@ def diff_command(first: str, second: str, as_json: bool) -> int:
     friction are listed, too.
     """
     from ddenv.runs.comparison import as_recent, compared, unlike
-    from ddenv.runs.subject import open_subject
+    from ddenv.runs.experiment import open_experiment
 
     subjects = [
-        open_subject(name, dict.fromkeys(("spawn", "goal", "world"))) for name in (first, second)
+        open_experiment(name, dict.fromkeys(("spawn", "goal", "world"))) for name in (first, second)
     ]
     one, other = (
         as_recent(name, each) for name, each in zip((first, second), subjects, strict=True)

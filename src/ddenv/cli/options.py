@@ -252,7 +252,7 @@ fetch_option = click.option(
 def given_reading(reading: Mapping[str, Any]) -> Mapping[str, Any]:
     """The options for reading worlds, checked before a screen opens. Raises UserError."""
     if any(reading.values()):
-        from ddenv.runs.subject import reading_of
+        from ddenv.runs.experiment import reading_of
 
         reading_of(**reading)
     return reading

@@ -130,7 +130,7 @@ def resume_command(
     compared.
     """
     from ddenv.cli.follow import follow_to_summary
-    from ddenv.guiding.commands import Change, Situation, send
+    from ddenv.guiding.commands import Change, Context, send
     from ddenv.runfile.fold import fold
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
@@ -164,7 +164,7 @@ def resume_command(
             with engine_lock(path):
                 if new:
                     change = Change(new)
-                    if why := change.refusal(Situation(fold(file.events()))):
+                    if why := change.refusal(Context(fold(file.events()))):
                         raise UserError(why)
                     send(file, change)
                 # Going back while no engine works ends in a pause, and without a screen nobody can

@@ -20,7 +20,7 @@ from ddenv.text import Data, coordinates, count, percent, printable
 
 if TYPE_CHECKING:
     from ddenv.runfile.progress import Claim
-    from ddenv.runs.subject import Subject
+    from ddenv.runs.experiment import Experiment
 
 # The options that say which runs are made.
 PLANNED = ("minimal", "test", "leave_out", "leave_each_out", "seed", "repeat")
@@ -127,17 +127,17 @@ def test_command(
 
 def _subject(
     name: str, given: Mapping[str, Any], simulator: Path | None, trust: bool, robots: ExitStack
-) -> Subject:
+) -> Experiment:
     """What `name` stands for; in another simulator, if one is given. `robots` keeps the file of a
     robot that only a run has.
     """
     from ddenv.engine.single_test import in_simulator
-    from ddenv.runs.subject import open_subject, robot_file
+    from ddenv.runs.experiment import open_experiment, robot_file
     from ddenv.runs.trust import check_named, check_trusted
     from ddenv.world.load import load_simulator
 
     another = None if simulator is None else load_simulator(simulator)
-    found = open_subject(name, given, announce)
+    found = open_experiment(name, given, announce)
     # Another simulator may start the scenario's own controller.
     if another is None:
         starts = found.scenario

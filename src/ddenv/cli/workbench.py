@@ -21,7 +21,7 @@ from ddenv.errors import UserError
 from ddenv.runs.folder import find_run, named
 
 if TYPE_CHECKING:
-    from ddenv.runs.subject import Fetch
+    from ddenv.runs.experiment import Fetch
 
 PORT = 8000
 
@@ -47,7 +47,7 @@ def open_command(
 
     'ddenv RUN_OR_FILE' does the same; options for reading worlds may also stand before RUN_OR_FILE.
     """
-    from ddenv.runs.subject import reading_of, world_of
+    from ddenv.runs.experiment import reading_of, world_of
     from ddenv.workbench.launch import run_workbench
     from ddenv.world.access import is_folder
 

@@ -31,7 +31,7 @@ from ddenv.world.access import is_directives
 from ddenv.world.pose import Point
 
 if TYPE_CHECKING:
-    from ddenv.runs.subject import Fetch
+    from ddenv.runs.experiment import Fetch
     from ddenv.world.model import Model, Note, World
     from ddenv.world.scenario import Reading
 
@@ -68,7 +68,7 @@ def _read(file: Path, options: Data) -> tuple[World, Reading]:
     """The world of an SDF file, or of a scenario, and how it was read by the options of
     `world_argument`. Raises UserError.
     """
-    from ddenv.runs.subject import reading_of, with_remembered, world_of
+    from ddenv.runs.experiment import reading_of, with_remembered, world_of
     from ddenv.world.sdf.read import parse_world, read_world
 
     file, own = world_of(file)
@@ -395,8 +395,8 @@ def _of_run(name: str, passes: bool) -> tuple[World, frozenset[str], list[str]]:
     from ddenv.evidence.slices import in_whole_world
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
+    from ddenv.runs.experiment import read_parts
     from ddenv.runs.reasons import removed_in_passing
-    from ddenv.runs.subject import read_parts
 
     path = find_run(name)
     with RunFile(path) as run:
@@ -462,8 +462,8 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
         )
     check_drake()
     from ddenv.robot.settled import moved, notes_on
-    from ddenv.robot.simulation.template import Variants
-    from ddenv.runs.subject import scenario_for_world
+    from ddenv.robot.simulation.plant_cache import PlantCache
+    from ddenv.runs.experiment import scenario_for_world
     from ddenv.world.access import write_file
     from ddenv.world.placement import note_inside
     from ddenv.world.sdf.moved import with_places
@@ -475,7 +475,7 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
     # Drake's plant needs a robot; piles settle as if there were none.
     scenario = scenario_for_world(world.path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
     announce(f"settling {count(able, 'model')} that can move")
-    settled = Variants(world, read_model(scenario.robot.model), scenario).settled()
+    settled = PlantCache(world, read_model(scenario.robot.model), scenario).settled()
     for about, words in (*note_inside(world), *notes_on(world, settled)):
         if about != "unrest":
             announce(words)

@@ -16,8 +16,8 @@ from ddenv.errors import UserError
 from ddenv.runfile.integrity import Whole, faults, rescue, whole
 from ddenv.runfile.lock import engine_is_alive, mode_beside
 from ddenv.runfile.store import RunFile
+from ddenv.runs.experiment import read_parts
 from ddenv.runs.programs import last_words
-from ddenv.runs.subject import read_parts
 from ddenv.text import count
 
 

@@ -14,7 +14,6 @@ from contextlib import closing
 from pathlib import Path
 
 from ddenv import __version__
-from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, DiskSpace, Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
@@ -23,14 +22,15 @@ from ddenv.engine.limits import check_crash_loop
 from ddenv.engine.margins import find_margins
 from ddenv.engine.notes import note_start
 from ddenv.engine.pool import Pool, Workers
+from ddenv.engine.scheduler import TestScheduler
 from ddenv.engine.shared import machine, simulator, tests_of_others
 from ddenv.errors import UserError
 from ddenv.runfile import events
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
 from ddenv.runs import processor
+from ddenv.runs.experiment import read_parts
 from ddenv.runs.programs import ENGINE_SAYS, ENGINE_STARTED
-from ddenv.runs.subject import read_parts
 from ddenv.runs.trust import HERE, check_cluster, check_trusted, made_here
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
@@ -125,16 +125,16 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         control = Control(journal, terminated, after, disk, attended=options.attended == "yes")
         others = None if options.share is None else tests_of_others(file, scenario, options.share)
         with closing(_workers(scenario, world, robot, jobs, cluster, journal)) as pool:
-            bench = Bench(journal, pool, control, others)
+            scheduler = TestScheduler(journal, pool, control, others)
             if scenario.oracle is None:
-                bench.check_repeats(options.bits == "mixed")
+                scheduler.check_repeats(options.bits == "mixed")
             note_start(scenario, world, robot, journal)
             if options.certify:
-                Driver(scenario, world, journal, bench, control).certify(
+                Driver(scenario, world, journal, scheduler, control).certify(
                     options.certify, options.certify_rate
                 )
             elif options.isolate is not None or journal.state.isolating is not None:
-                isolate(world, journal, bench, options.isolate or None, before)
+                isolate(world, journal, scheduler, options.isolate or None, before)
             elif options.margins is not None or journal.state.margining is not None:
                 if options.margins is None:
                     asked = None
@@ -144,7 +144,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
                     (scenario, world, robot), journal, pool, control, asked, (stood, before)
                 )
             else:
-                Driver(scenario, world, journal, bench, control).reduce()
+                Driver(scenario, world, journal, scheduler, control).reduce()
     except Stopped as stop:
         journal.lose_running()
         journal.record(events.EngineStopped(reason=str(stop)))

@@ -221,7 +221,7 @@ class Control:
         try:
             try:
                 command = c.parse(request.kind, request.data)
-                why = c.refusal(command, c.Situation(self._journal.state))
+                why = c.refusal(command, c.Context(self._journal.state))
                 if not why:
                     self._do(command)
             except UserError as error:

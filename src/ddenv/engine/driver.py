@@ -12,12 +12,12 @@ from functools import partial
 from itertools import cycle, islice
 from typing import Any, NoReturn
 
-from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import Sight, fix_failure, known_failure, rows_of, spec_of
+from ddenv.engine.judging import SchemaInputs, fix_failure, known_failure, rows_of, spec_of
 from ddenv.engine.limits import limit_after
 from ddenv.engine.notes import note, note_alike, note_ends, note_price, note_rare
+from ddenv.engine.scheduler import TestScheduler
 from ddenv.engine.slicing import compare, slice_audit, slice_environment
 from ddenv.engine.worker import Broken
 from ddenv.environment import NOTHING, Environment, Numbers
@@ -82,15 +82,20 @@ class Driver:
     """
 
     def __init__(
-        self, scenario: Scenario, world: World, journal: Journal, bench: Bench, control: Control
+        self,
+        scenario: Scenario,
+        world: World,
+        journal: Journal,
+        scheduler: TestScheduler,
+        control: Control,
     ) -> None:
         self._scenario = scenario
         self._world = world
         self._reduction = scenario.reduction
         self._journal = journal
-        self._bench = bench
+        self._scheduler = scheduler
         self._control = control
-        self._sight = Sight(
+        self._sight = SchemaInputs(
             world, journal.state.elements, self._reduction.delta, self._reduction.seed
         )
         # What the schemas know: the tests behind the verdicts of rounds that are over, each once.
@@ -168,7 +173,7 @@ class Driver:
             "only ddenv's own simulator finds which models rest on which; leave it out, or 'oracle'"
         )
         if scenario.oracle is None:
-            found = self._bench.settle()
+            found = self._scheduler.settle()
             if not isinstance(found, Broken):
                 for about, words in notes_on(self._world, found.settled):
                     note(journal, about, words)
@@ -198,7 +203,7 @@ class Driver:
         try:
             self._carry_out(steps.certify(self, leg, chain))
         except steps.Changed:
-            self.next_leg()
+            self.start_search()
             raise Stopped(CHANGED) from None
         self._conclude()
 
@@ -214,7 +219,7 @@ class Driver:
                 return end.value
             changed = None
             try:
-                self._bench.work(tests)
+                self._scheduler.work(tests)
             except steps.Changed as change:
                 changed = change
 
@@ -226,10 +231,10 @@ class Driver:
         # The user may have gone back before this engine started; then it pauses there.
         if self._journal.state.search_due:
             with suppress(steps.Changed):
-                self._bench.wait_for_search()
-        return self.next_leg()
+                self._scheduler.wait_for_search()
+        return self.start_search()
 
-    def next_leg(self) -> steps.Leg:
+    def start_search(self) -> steps.Leg:
         slice_environment(self._journal)
         return self._next_leg()
 
@@ -270,7 +275,9 @@ class Driver:
             steps_back=leg.steps_back,
             broke=broken_runs(state),
         )
-        rule = self._bench.rule = Acceptance(most_misses=len(exact), exact=exact) if exact else rule
+        rule = self._scheduler.rule = (
+            Acceptance(most_misses=len(exact), exact=exact) if exact else rule
+        )
         chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
         self._leg = steps.Leg(
             first_round=leg.first_round,
@@ -303,7 +310,7 @@ class Driver:
         if (
             test is not None
             and test.phase == "baseline"
-            and self._bench.made_again(test) is not None
+            and self._scheduler.made_again(test) is not None
         ):
             raise UserError(
                 f"reduction.accept_rate: exact needs runs that repeat, but run {test.run + 1} of "
@@ -497,7 +504,7 @@ class Driver:
         if journal.state.accept_mode == "ask" and journal.current.accepted != index:
             journal.record(events.Waiting(round=number, candidate=index))
             while journal.state.accept_mode == "ask" and journal.state.waiting_candidate == index:
-                self._bench.tick()
+                self._scheduler.tick()
             if journal.state.waiting_candidate == index:
                 journal.record(events.Decided(round=number, candidate=index, decision="accept"))
             if journal.current.accepted != index:
@@ -543,9 +550,9 @@ class Driver:
         if not failing or replays > MOST_REPLAYS or any(test.round == round for test in shown):
             return
         for replay, test in enumerate(islice(cycle(failing), replays)):
-            result = self._bench.made_again(test, tells=not replay)
+            result = self._scheduler.made_again(test, tells=not replay)
             # A replay that broke says nothing of f.
-            if result is None or self._bench.outcome_of(result) in ("similar", *BROKEN):
+            if result is None or self._scheduler.outcome_of(result) in ("similar", *BROKEN):
                 return
         last = max(test.id for test in shown)
         raise UserError(
@@ -556,11 +563,11 @@ class Driver:
     def search_ended(self, environment: Environment) -> None:
         self._audit_slice()
         # Their results count, too.
-        self._bench.finish_trials()
+        self._scheduler.finish_trials()
 
     def _audit_slice(self) -> None:
         while tests := slice_audit(self._journal):
-            self._bench.work(tests)
+            self._scheduler.work(tests)
 
     def certificate_due(self) -> steps.Certificate:
         """The certificate that this search has already, or a new one; a finished one only if no
@@ -669,7 +676,7 @@ class Driver:
         """
         journal = self._journal
         for test in (journal.state.test(number) for number in tests):
-            repeats = self._bench.made_again(test) is None
+            repeats = self._scheduler.made_again(test) is None
             if journal.state.search_due:
                 raise steps.Changed
             if not repeats:
@@ -720,7 +727,7 @@ class Driver:
         journal.record(
             events.RateLost(node=node, lost=lost, again=again, tests=journal.full_tests(tests))
         )
-        self._bench.wait_for_search()
+        self._scheduler.wait_for_search()
 
     def left_out(self, model: int, environment: Environment) -> NoReturn:
         journal = self._journal
@@ -732,7 +739,7 @@ class Driver:
                 without=model, environment=journal.number(environment), evidence_test=evidence
             )
         )
-        self._bench.wait_for_search()
+        self._scheduler.wait_for_search()
 
     # The end.
 
@@ -764,7 +771,7 @@ class Driver:
         self._end(is_minimal(certificate), reason)
 
     def _end(self, minimal: bool, reason: str) -> None:
-        self._bench.finish_trials()
+        self._scheduler.finish_trials()
         left = self._journal.state.environment
         for about, words in (*note_unseen(self._world, left), *note_pieces(self._world, left)):
             note(self._journal, about, f"what is left has {words}")

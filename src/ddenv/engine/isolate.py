@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from typing import cast
 
-from ddenv.engine.bench import Bench
 from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.judging import Sight, known_failure
+from ddenv.engine.judging import SchemaInputs, known_failure
+from ddenv.engine.scheduler import TestScheduler
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import ERROR, HELPING, Claim, Verdict
 from ddenv.evidence.rates import Shown, anytime_interval
@@ -37,19 +37,19 @@ CHANGED = (
 
 
 def isolate(
-    world: World, journal: Journal, bench: Bench, at_least: int | None, before: str
+    world: World, journal: Journal, scheduler: TestScheduler, at_least: int | None, before: str
 ) -> None:
     """Finds the nearest world that passes, or goes on with that; the run is finished then as it
     was, because of `before`.
 
     The end has `at_least` fresh runs; another number than the open search has begins a new one.
-    Raises as `Bench.work`.
+    Raises as `TestScheduler.work`.
     """
     now = journal.state.isolating
     if now is None or at_least not in (None, now.asked.at_least):
         _begin(world, journal, at_least, before if now is None else now.asked.before)
-    removed = _Isolator(journal, bench).carry_out()
-    bench.finish_trials()
+    removed = _Isolator(journal, scheduler).carry_out()
+    scheduler.finish_trials()
     # Tests that ran ahead of time are no longer needed.
     journal.lose_running()
     _open(journal)
@@ -78,7 +78,7 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
     last = state.isolations[-1] if state.isolations else None
     # One model of each stack that may go: first those that the reduction has left, then the nearest
     # to f.
-    evidence = Sight(world, state.elements, reduction.delta, reduction.seed).evidence(
+    evidence = SchemaInputs(world, state.elements, reduction.delta, reduction.seed).evidence(
         journal, known_failure(state).failure_test
     )
     distance = distances_to_failure(state.elements, evidence).tolist()
@@ -121,9 +121,9 @@ class _Isolator:
     end.
     """
 
-    def __init__(self, journal: Journal, bench: Bench) -> None:
+    def __init__(self, journal: Journal, scheduler: TestScheduler) -> None:
         self._journal = journal
-        self._bench = bench
+        self._scheduler = scheduler
         self._whole = journal.state.environments[0]
         now = _open(journal).asked
         rule = Each(now.chosen) if now.chosen else Passing(now.wanted, now.rather_than)
@@ -140,8 +140,8 @@ class _Isolator:
         )
 
     def carry_out(self) -> Environment | None:
-        """To the end; returns what has to go so that the robot passes. Raises as `Bench.work`, and
-        Stopped.
+        """To the end; returns what has to go so that the robot passes. Raises as
+        `TestScheduler.work`, and Stopped.
         """
         work = isolation(self, self._asked, self._known_checks())
         while True:
@@ -151,7 +151,7 @@ class _Isolator:
             except StopIteration as end:
                 removed: Environment | None = end.value
                 return removed
-            self._bench.work(tests)
+            self._scheduler.work(tests)
 
     refusals = 0
 

@@ -295,7 +295,7 @@ def traits_of(model: Model) -> Traits:
     return Traits(size, friction, not model.static)
 
 
-class Sight:
+class SchemaInputs:
     """The part of the evidence that comes from the world and never changes in a run."""
 
     def __init__(self, world: World, elements: Sequence[str], delta: float, seed: int) -> None:

@@ -9,12 +9,12 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 
-from ddenv.engine.bench import MOST_BROKEN, WAIT
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failures_of, motions_of, result_data
 from ddenv.engine.limits import wall_limit
 from ddenv.engine.pool import Workers
+from ddenv.engine.scheduler import MOST_BROKEN, WAIT
 from ddenv.engine.worker import Result, Run
 from ddenv.errors import UserError
 from ddenv.evidence import margins as known

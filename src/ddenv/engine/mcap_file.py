@@ -19,12 +19,12 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.robot.protocol import Reading, Setup, Twist, WheelSpeeds
 from ddenv.robot.result import RunResult
-from ddenv.robot.simulation.template import Variants
+from ddenv.robot.simulation.plant_cache import PlantCache
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
+from ddenv.runs.experiment import Experiment, read_subject
 from ddenv.runs.reasons import GOAL, F, nearest, reasons
-from ddenv.runs.subject import Subject, read_subject
 from ddenv.words.claims import shown
 from ddenv.world import scenario
 from ddenv.world.access import write_file
@@ -161,7 +161,7 @@ def write_mcap(run: Path, target: Path) -> list[str]:
             f"{run}: f is not known yet, so there is no run to write; run it first: ddenv resume "
             f"{run}"
         )
-    template = Variants(subject.world, subject.robot, subject.scenario)
+    template = PlantCache(subject.world, subject.robot, subject.scenario)
     said = []
     output = BytesIO()
     writer = Writer(output)
@@ -208,7 +208,7 @@ def _chosen(file: RunFile, state: RunState) -> Iterator[tuple[str, int]]:
 
 
 def messages(
-    run: str, models: frozenset[str], result: RunResult, streams: Streams, subject: Subject
+    run: str, models: frozenset[str], result: RunResult, streams: Streams, subject: Experiment
 ) -> Iterator[Row]:
     """What is still, what moved, and what the robot sensed and did in a run of these models."""
     goal = subject.scenario.goal

@@ -24,8 +24,8 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.state import Test as KnownTest
 from ddenv.runfile.store import RunFile
+from ddenv.runs.experiment import Experiment, read_subject
 from ddenv.runs.playback import table
-from ddenv.runs.subject import Subject, read_subject
 from ddenv.runs.trust import check_trusted, trust, untrusted
 from ddenv.text import Data, Names, count
 from ddenv.words.claims import still_fails
@@ -45,7 +45,7 @@ class Trial:
     of: int | None = None
 
 
-def in_simulator(subject: Subject, simulator: Oracle, robot: Path) -> Subject:
+def in_simulator(subject: Experiment, simulator: Oracle, robot: Path) -> Experiment:
     """The same, in this simulator in place of the scenario's own; it finds the robot in the file
     `robot`.
     """
@@ -56,7 +56,7 @@ def in_simulator(subject: Subject, simulator: Oracle, robot: Path) -> Subject:
 
 
 def plan(
-    subject: Subject,
+    subject: Experiment,
     *,
     keep: list[str] | None = None,
     minimal: bool = False,
@@ -105,7 +105,7 @@ def plan(
     return trials
 
 
-def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> Names:
+def _models(subject: Experiment, keep: list[str] | None, minimal: bool) -> Names:
     if minimal and subject.state is None:
         raise UserError("--minimal: needs a run; a scenario has no minimal environment yet")
     if minimal and keep is not None:
@@ -120,7 +120,7 @@ def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> Names:
     return subject.elements
 
 
-def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[Data]:
+def run_trials(subject: Experiment, trials: list[Trial], jobs: int) -> Iterator[Data]:
     """Makes the runs in worker processes; yields the result of each, in order, as plain data.
     Without f a failed run is just "failed".
     """
@@ -184,7 +184,7 @@ class Reproduction:
         return f"{self.said}: f in {self.shown} of {count(self.runs, 'run')}"
 
 
-def subject_in(run: Path, folder: Path | None) -> Subject:
+def subject_in(run: Path, folder: Path | None) -> Experiment:
     """The world of a run; the user's own controller or simulator is that in `folder`, if given.
     Raises UserError.
     """
@@ -206,7 +206,7 @@ def last_of(run: Path, folder: Path | None, most: int, jobs: int, trusted: bool)
     return found
 
 
-def expected(subject: Subject, where: object) -> Certificate:
+def expected(subject: Experiment, where: object) -> Certificate:
     """The certificate of all that is left. Raises UserError where there is none, or where it showed
     no failure.
     """
@@ -222,7 +222,7 @@ def expected(subject: Subject, where: object) -> Certificate:
 
 
 def reproduce(
-    subject: Subject, certificate: Certificate, most: int, jobs: int
+    subject: Experiment, certificate: Certificate, most: int, jobs: int
 ) -> Iterator[tuple[Data, Reproduction]]:
     """Runs what is left with fresh seeds, at most `most` times, until it is known whether f shows
     at the rate that its certificate expects; where chosen runs were reduced, with their seeds, of

@@ -32,7 +32,7 @@ from ddenv.world.scenario import Scenario
 from ddenv.world.sdf.numbers import part_of
 
 if TYPE_CHECKING:
-    from ddenv.robot.simulation.template import Variants
+    from ddenv.robot.simulation.plant_cache import PlantCache
 
 NICENESS = 5
 # Time between two moments of a running test, s.
@@ -134,9 +134,9 @@ def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
     if scenario.oracle is not None:
         return (PythonSimulator if scenario.oracle.use else ExternalSimulator)(world, scenario)
     # Drake takes a second to load, and users of another simulator may not have it.
-    from ddenv.robot.simulation.template import Variants
+    from ddenv.robot.simulation.plant_cache import PlantCache
 
-    return Variants(world, robot, scenario)
+    return PlantCache(world, robot, scenario)
 
 
 def work(line: Connection, output: Connection, parts: Any) -> None:
@@ -214,7 +214,7 @@ def answered(
         if isinstance(simulator, Exception):
             raise simulator
         if isinstance(task, Settle):
-            world = cast("Variants", simulator)
+            world = cast("PlantCache", simulator)
             return Start(world.supports(task.elements), world.settled(), world.ties(task.elements))
         if isinstance(simulator, ExternalSimulator):
             # It ends a test itself, and says why.

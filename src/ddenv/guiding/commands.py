@@ -14,7 +14,7 @@ from typing import Any, Literal, dataclass_transform, get_args
 from ddenv.environment import Numbers
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current, fresh_runs_made, in_the_making, only_helping
-from ddenv.runfile.deeds import deed
+from ddenv.runfile.failure_words import deed
 from ddenv.runfile.fold_decisions import place
 from ddenv.runfile.reading import Invalid, plain, read
 from ddenv.runfile.run_settings import settings
@@ -48,7 +48,7 @@ NO_MODELS = "no such models"
 
 
 @dataclass(frozen=True, slots=True)
-class Situation:
+class Context:
     """A run, and what else decides whether a command is possible.
 
     `barred` is why this viewer cannot guide the run at all, or "". `pending` is the viewer's last
@@ -89,7 +89,7 @@ class Asked:
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True)(cls)
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         """Why it is not possible now, in one line, or ""."""
         return now.needs_engine()
 
@@ -156,7 +156,7 @@ class Step(Asked):
 
     unit: Literal["test", "round"] = "test"
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         waits = now.state.waiting_candidate is not None
         return now.needs_engine() or (
             "a reduction waits: accept it with a, or reject it with x" if waits else ""
@@ -183,7 +183,7 @@ class AcceptMode(Asked):
 class Stop(Asked):
     """End the engine; another one can go on from there."""
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         if now.engine == "absent":
             return "no engine is running"
         return ""
@@ -192,7 +192,7 @@ class Stop(Asked):
 class StartEngine(Asked):
     """Start an engine on the run. It is not a command: the run file does not have it."""
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         state = now.state
         if now.engine == "alive":
             return f"the engine is running already{'; space resumes' if state.paused else ''}"
@@ -215,7 +215,7 @@ class Isolate(Asked):
 
     again: bool = False
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         state = now.state
         if state.baseline is None:
             return "no failure is known yet, so there is nothing to isolate"
@@ -236,7 +236,7 @@ class Undo(Asked):
     again.
     """
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         here = now.state.here
         if here is None or here.parent is None:
             return "there is no reduction to take back"
@@ -262,7 +262,7 @@ class GoBack(Asked):
 
     node: int
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         state = now.state
         if not 0 <= self.node < len(state.nodes):
             return "there is no such place in the history"
@@ -293,7 +293,7 @@ class Change(Asked):
 
     settings: Data
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         if not set(self.settings) <= set(CHANGEABLE):
             return ONLY_CHANGEABLE
         if wrong := [why for name, value in self.settings.items() if (why := _wrong(name, value))]:
@@ -411,7 +411,7 @@ class OfCandidate(Asked):
             return "the candidate"
         return one.label
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         state = now.state
         waits = waiting(now.state)
         # When a new search is due, earlier reductions can no longer be accepted.
@@ -440,7 +440,7 @@ class Reject(OfCandidate):
 class Veto(OfCandidate):
     """Leave out a candidate that has no verdict yet."""
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         one = self.meant(now.state)
         if one is None:
             return round_over(now.state)
@@ -463,7 +463,7 @@ class Veto(OfCandidate):
 class Unveto(OfCandidate):
     """Try a vetoed or rejected candidate after all."""
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         one = self.meant(now.state)
         if one is None:
             return round_over(now.state)
@@ -496,7 +496,7 @@ class Pin(Asked):
 
     models: Numbers
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         names = _names_of(now.state, self.models)
         kept = frozenset(now.state.environment)
         if not names:
@@ -527,7 +527,7 @@ class Unpin(Asked):
 
     models: Numbers
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         if self.pinned(now.state):
             return ""
         return "not pinned"
@@ -545,7 +545,7 @@ class Try(Asked):
 
     models: Numbers
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         state = now.state
         names = _names_of(now.state, self.models)
         if names is None:
@@ -583,7 +583,7 @@ class Adopt(Asked):
 
     trial: int
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         state = now.state
         trial = self.meant(now.state)
         if trial is None:
@@ -614,7 +614,7 @@ class LeaveOut(Asked):
 
     model: int
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         if self.evidence(now.state) is None:
             return NONE_HELPS
         return ""
@@ -656,7 +656,7 @@ class AcceptOther(Asked):
     test: int
     instead: bool = False
 
-    def refusal(self, now: Situation) -> str:
+    def refusal(self, now: Context) -> str:
         state = now.state
         if state.baseline is None:
             return NO_FAILURE
@@ -726,7 +726,7 @@ GOES_ON = (Try, Adopt, LeaveOut, AcceptOther, Undo, GoBack, Change)
 ANEW = (Pin, Unpin, Adopt, AcceptOther, Undo, GoBack)
 
 
-def refusal(command: Command | StartEngine | Isolate, now: Situation) -> str:
+def refusal(command: Command | StartEngine | Isolate, now: Context) -> str:
     """Why a command is not possible now, in one line, or ""."""
     return now.barred or command.refusal(now)
 
@@ -778,7 +778,7 @@ def question(command: Command, state: RunState) -> str:
     return f"{lost}\n\n{command.words(state).brief.capitalize()} anyway?"
 
 
-def said(command: Command, now: Situation) -> str:
+def said(command: Command, now: Context) -> str:
     """What the screen says when a command is sent, or ""."""
     words = command.words(now.state).said
     if not words or now.engine != "absent":

@@ -4,8 +4,8 @@ texts, questions and answers.
 
 from __future__ import annotations
 
+from ddenv.learn.catalog import Opened
 from ddenv.learn.lesson import MISCONCEPTIONS, blocks
-from ddenv.learn.shelf import Opened
 from ddenv.page.blocks import (
     Block,
     Name,

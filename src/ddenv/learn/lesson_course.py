@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from ddenv.learn.attempt import Attempt
-from ddenv.learn.foretelling import at_hand, foretelling
+from ddenv.learn.catalog import Opened
 from ddenv.learn.lesson import Answer, Block, Question, blocks
 from ddenv.learn.lesson import Step as LessonStep
+from ddenv.learn.prediction import at_hand, foretelling
 from ddenv.learn.race import Play, bet, in_one_sentence, result
 from ddenv.learn.score import Score, summary
-from ddenv.learn.shelf import Opened
 from ddenv.runfile.position import Position, Step
 
 FREE = (

@@ -19,7 +19,7 @@ from ddenv.evidence.certificate import NEEDED_SHARE
 from ddenv.evidence.claims import so_far
 from ddenv.evidence.rates import anytime_interval, miss_chance
 from ddenv.learn.attempt import Oracle
-from ddenv.runfile.deeds import deed
+from ddenv.runfile.failure_words import deed
 from ddenv.runfile.progress import Certificate, Claim, Node
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState

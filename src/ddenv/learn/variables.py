@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ddenv.runfile.deeds import DEEDS
+from ddenv.runfile.failure_words import DEEDS
 from ddenv.runfile.position import Moment
 from ddenv.runfile.state import REFUSED, Candidate, RunState, Test
 from ddenv.runfile.tested import pointed

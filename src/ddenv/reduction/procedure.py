@@ -201,7 +201,7 @@ class Runs(Protocol):
 class Driver(Runs, Protocol):
     """What the procedure asks and tells. All answers follow from tests that have ended, and from
     decisions of the user. Where one of these, or a slice, ends the search, any method may raise
-    `Changed`; it goes on with `next_leg`.
+    `Changed`; it goes on with `start_search`.
     """
 
     def rate(self) -> float:
@@ -220,7 +220,7 @@ class Driver(Runs, Protocol):
     def failure_fixed(self, runs: int) -> Leg:
         """The baseline of so many runs is over; returns the leg with which the search begins."""
 
-    def next_leg(self) -> Leg:
+    def start_search(self) -> Leg:
         """The next search, after `Changed`."""
 
     def algorithm(self, leg: Leg) -> Search:
@@ -283,7 +283,7 @@ def procedure(
             certified = yield from certify(driver, leg, chain)
             leg = yield from onward(driver, leg, chain, certified)
         except Changed:
-            leg = driver.next_leg()
+            leg = driver.start_search()
     return certified
 
 

@@ -272,7 +272,7 @@ def reduce(
         most_tests=int(most_tests),
     )
     # A missing argument is reported before the first test.
-    next(begin(caller.next_leg()), None)
+    next(begin(caller.start_search()), None)
     minimal: bool | None = None
     if seems_steady:
         minimal = caller.search_if_steady(check)
@@ -401,7 +401,7 @@ class _Caller:
         """Takes the first call with the failure; returns whether the failure was gone without each
         element that is left.
         """
-        leg = self.next_leg()
+        leg = self.start_search()
         self.carry_out(steps.search_on(self, leg))
         verdicts = (standing([rest], self.shown, leg.rule)[0] for rest in self._removals())
         return all(verdict == ["dissimilar"] for verdict in verdicts)
@@ -468,9 +468,9 @@ class _Caller:
         return steps.Baseline(sum(self._of_whole))
 
     def failure_fixed(self, runs: int) -> steps.Leg:
-        return self.next_leg()
+        return self.start_search()
 
-    def next_leg(self, again: tuple[Partition, ...] = ()) -> steps.Leg:
+    def start_search(self, again: tuple[Partition, ...] = ()) -> steps.Leg:
         rate = self.rate() if self.keep_rate else 0.0
         # While calls are left it goes back, however often.
         steps_back = min(len(self._lost), steps.MOST_STEPS_BACK - 1)
@@ -566,11 +566,11 @@ class _Caller:
     def stepped_back(self, place: int, again: tuple[Partition, ...], tests: object) -> steps.Leg:
         self._lost.append(self._chain[place + 1])
         self._go(*self._chain[: place + 1])
-        return self.next_leg(again)
+        return self.start_search(again)
 
     def left_out(self, model: int, environment: Environment) -> steps.Leg:
         self._go(*self._chain, environment)
-        return self.next_leg()
+        return self.start_search()
 
     @property
     def left(self) -> Environment:

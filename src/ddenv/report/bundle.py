@@ -18,7 +18,7 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.report.report import content, write_report
 from ddenv.report.run_data import Record, read_run
-from ddenv.runfile.deeds import deed
+from ddenv.runfile.failure_words import deed
 from ddenv.runs.export import export_world
 from ddenv.runs.folder import BUNDLED_RUN
 from ddenv.runs.programs import how_to_install

@@ -21,7 +21,7 @@ from ddenv.page.blocks import (
     thousands,
 )
 from ddenv.report.run_data import Record
-from ddenv.runfile.deeds import DEEDS
+from ddenv.runfile.failure_words import DEEDS
 from ddenv.runfile.failures import atlas
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState

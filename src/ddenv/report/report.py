@@ -23,10 +23,10 @@ from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
 from ddenv.report.outcomes import others_met, rate_of_left, sureness, worth
 from ddenv.report.repeat import repeat, settings
+from ddenv.report.result import margins, what_is_left, why
 from ddenv.report.rounds import guiding, way
 from ddenv.report.run_data import Record, read_run
-from ddenv.report.what_is_left import margins, what_is_left, why
-from ddenv.runfile.deeds import deed
+from ddenv.runfile.failure_words import deed
 from ddenv.runfile.state import RunState, spent
 from ddenv.text import as_sentence, coordinates, count, plain
 from ddenv.words.claims import ended, for_everyone

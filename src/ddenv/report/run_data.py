@@ -18,8 +18,8 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Round, RunState
 from ddenv.runfile.store import Recorded, RunFile
 from ddenv.runs.changes import Change, changes
+from ddenv.runs.experiment import read_parts
 from ddenv.runs.reasons import Nearest, Reason, nearest, reasons
-from ddenv.runs.subject import read_parts
 from ddenv.text import Data, Sentences
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, dataclass_transform
 
 from ddenv.environment import NOTHING
-from ddenv.runfile.deeds import named
+from ddenv.runfile.failure_words import named
 from ddenv.runfile.reading import (
     Models,
     Natural,

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from ddenv.environment import Numbers
-from ddenv.runfile.deeds import named
 from ddenv.runfile.events import Place
+from ddenv.runfile.failure_words import named
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 

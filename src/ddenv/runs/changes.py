@@ -11,7 +11,7 @@ from ddenv.evidence.margins import MOST_RUNS, changes_at
 from ddenv.runfile.events import MarginRan
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
-from ddenv.runs.reasons import F, Parting, parted, parting_words
+from ddenv.runs.reasons import Divergence, F, parted, parting_words
 from ddenv.words.margins import rows
 from ddenv.world.model import Model, World
 from ddenv.world.pose import Pose
@@ -36,7 +36,7 @@ class Change:
     changes: tuple[tuple[str, float], ...]
     verdict: str
     sentence: str
-    parting: Parting | None
+    parting: Divergence | None
     limits: tuple[Limit, ...]
 
 
@@ -126,7 +126,7 @@ def changed_run(state: RunState, number: int) -> tuple[MarginRan, Test]:
     return one, test
 
 
-def _parting(file: RunFile, state: RunState, name: str, value: float) -> Parting | None:
+def _parting(file: RunFile, state: RunState, name: str, value: float) -> Divergence | None:
     left = beside(state)
     margins = state.margins
     if left is None or margins is None:
@@ -137,7 +137,7 @@ def _parting(file: RunFile, state: RunState, name: str, value: float) -> Parting
             samples := file.motion(number)
         ):
             equal, apart, parted_at = parted(file.trajectory(left.id), samples)
-            return Parting(
+            return Divergence(
                 with_test=left.id,
                 without_test=number,
                 seed=left.seed,

@@ -8,8 +8,8 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from ddenv.runfile.state import RunState
+from ddenv.runs.experiment import Experiment
 from ddenv.runs.recent import Recent, recent_of
-from ddenv.runs.subject import Subject
 from ddenv.text import coordinates, count, first_of, plain, truncated
 from ddenv.words.signs import brief
 from ddenv.world.extent import model_bounds
@@ -89,7 +89,7 @@ def _names(run: Recent, other: Recent, *, in_both: bool) -> str:
     return NONE
 
 
-def as_recent(name: str, subject: Subject) -> Recent:
+def as_recent(name: str, subject: Experiment) -> Recent:
     """What `name` stands for, as a list would show it; of a scenario nothing was run."""
     state = subject.state or RunState(
         scenario=subject.scenario.model_dump(mode="json"),

@@ -10,9 +10,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.events import Created
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
-from ddenv.runs.export import renamed
-from ddenv.runs.folder import named, run_path
-from ddenv.runs.subject import (
+from ddenv.runs.experiment import (
     RESOURCE,
     Announce,
     check_parts,
@@ -21,6 +19,8 @@ from ddenv.runs.subject import (
     read_parts,
     scenario_named,
 )
+from ddenv.runs.export import renamed
+from ddenv.runs.folder import named, run_path
 from ddenv.runs.trust import check_cluster, check_named, trust_cluster, trusted_scenario
 from ddenv.world.access import check_ending, is_world, read_bytes
 from ddenv.world.files.resources import Resources

@@ -13,8 +13,8 @@ from ddenv.errors import UserError
 from ddenv.evidence.margins import fixes_of
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
+from ddenv.runs.experiment import RESOURCE, Experiment, read_subject
 from ddenv.runs.reasons import removed_in_passing
-from ddenv.runs.subject import RESOURCE, Subject, read_subject
 from ddenv.runs.trust import scenario_text
 from ddenv.schemas import nearest
 from ddenv.text import Data, Names
@@ -114,7 +114,7 @@ def export_world(
     return Exported([sdf, model, scenario_file], needs, whole=state.baseline is None)
 
 
-def with_margins(subject: Subject, margins: Sequence[str]) -> Subject:
+def with_margins(subject: Experiment, margins: Sequence[str]) -> Experiment:
     """A run's world and scenario with the changes that `margins`, each NAME or NAME=VALUE, mean.
     Raises UserError.
     """

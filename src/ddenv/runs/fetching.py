@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.runs.subject import Parse
+from ddenv.runs.experiment import Parse
 from ddenv.world.access import MissingFiles, Unusable, read_bytes
 from ddenv.world.files.fuel import FuelModel
 from ddenv.world.files.fuel_download import Archive, Shown, download

@@ -56,7 +56,7 @@ class End:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parting:
+class Divergence:
     """Where two runs with the same seed part: one of what is left, which shows f, and one without a
     model.
 
@@ -88,7 +88,7 @@ class Reason:
     gone: Names
     runs: int
     ends: tuple[End, ...]
-    parting: Parting | None
+    parting: Divergence | None
     lacks: str = ""
     exact: bool = False
 
@@ -171,7 +171,7 @@ def _end(kind: str, tests: Sequence[Test]) -> End:
 
 def parting_of(
     file: RunFile, pair: tuple[Test, Test] | None, gone: Sequence[str]
-) -> tuple[Parting | None, str, str]:
+) -> tuple[Divergence | None, str, str]:
     """Where two tests part, one with the models `gone` and one without them; which of these took
     part first, "" if none did; and what the run file lacks to say so. None where there is no such
     `pair`.
@@ -186,7 +186,7 @@ def parting_of(
     touched = {model: at for model, at in with_it.first_touched if model in gone}
     met = touched or {model: at for model, at in with_it.first_sensed if model in gone}
     first = min(met, key=met.__getitem__, default="")
-    parting = Parting(
+    parting = Divergence(
         with_test=with_it.id,
         without_test=without.id,
         seed=with_it.seed,
@@ -253,7 +253,7 @@ def parting_sentence(reason: Reason) -> str:
     return parting_words(reason.parting, reason.lacks, f"With {it} there,", it)
 
 
-def parting_words(one: Parting | None, lacks: str, met: str, it: str = "it") -> str:
+def parting_words(one: Divergence | None, lacks: str, met: str, it: str = "it") -> str:
     """When two runs begin to differ, and when and where they are visibly apart, or why that is not
     known; then a sentence that begins with `met`, if the robot met `it`.
     """
@@ -292,7 +292,7 @@ class Nearest:
     gone: Names
     words: str
     shown: bool
-    parting: Parting | None = None
+    parting: Divergence | None = None
     first: str = ""
     lacks: str = ""
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runs.remembered import read_state, write_state
+from ddenv.runs.preferences import read_state, write_state
 from ddenv.text import Data
 from ddenv.world.access import is_folder, without_tilde
 

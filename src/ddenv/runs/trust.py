@@ -28,9 +28,9 @@ import yaml
 
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
+from ddenv.runs.experiment import read_scenario
+from ddenv.runs.preferences import read_state, write_state
 from ddenv.runs.programs import how_to_install
-from ddenv.runs.remembered import read_state, write_state
-from ddenv.runs.subject import read_scenario
 from ddenv.world.access import is_file
 from ddenv.world.command import start_folder
 from ddenv.world.scenario import Scenario

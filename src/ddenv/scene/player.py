@@ -19,9 +19,9 @@ from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import COLUMNS, Live, RunFile
 from ddenv.runfile.tested import Wanted, made_for
 from ddenv.runs.changes import changed_run, changes
+from ddenv.runs.experiment import read_parts
 from ddenv.runs.playback import played, table
-from ddenv.runs.reasons import Parting, nearest, reasons
-from ddenv.runs.subject import read_parts
+from ddenv.runs.reasons import Divergence, nearest, reasons
 from ddenv.scene import colors
 from ddenv.scene.camera import scale_of, set_up, view
 from ddenv.scene.draw import FLAG, PARTING, PIN, Scenery, mark
@@ -131,7 +131,7 @@ class Player:
         until when they are the same, `apart` when the robots are visibly apart, both s; None if
         they never are.
         """
-        found: list[tuple[str, Parting | None]] = []
+        found: list[tuple[str, Divergence | None]] = []
         with suppress(UserError):
             found += [
                 (f"with and without {each.without}", each.parting)
@@ -284,7 +284,7 @@ class Player:
             self._caption(self._shot, "")
 
 
-def _numbers(one: Parting) -> str:
+def _numbers(one: Divergence) -> str:
     if one.without_test > 0:
         return f"tests {one.with_test} and {one.without_test}"
     return f"test {one.with_test}"

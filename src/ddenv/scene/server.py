@@ -34,8 +34,8 @@ import tornado.websocket
 
 from ddenv.errors import UserError
 from ddenv.page.html import of_scripts, policy
+from ddenv.runs.preferences import read_state, write_state
 from ddenv.runs.programs import FIRST_PORT
-from ddenv.runs.remembered import read_state, write_state
 from ddenv.scene.player import Player
 
 # Where the scenes of runs were served last, so many of them.

@@ -23,8 +23,8 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.experiment import load_parts
 from ddenv.runs.programs import STOP_WAIT, last_words, start_engine, stop_engines
-from ddenv.runs.subject import load_parts
 from ddenv.study.folder import Session, machine, opened, sessions, versions, write_sessions
 from ddenv.study.plan import Cell, Plan, run_path
 from ddenv.study.results import difference, read_cell

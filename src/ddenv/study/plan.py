@@ -15,8 +15,8 @@ from typing import Any
 from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.runfile.state import FIRST_FRESH_RUN
+from ddenv.runs.experiment import with_options
 from ddenv.runs.folder import SUFFIX
-from ddenv.runs.subject import with_options
 from ddenv.text import Names
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario
@@ -159,7 +159,7 @@ def make_plan(
 ) -> Plan:
     """The study of these words; each may hold several names separated by commas. Raises UserError.
 
-    `options` are those of `ddenv.runs.subject.with_options` for all of it.
+    `options` are those of `ddenv.runs.experiment.with_options` for all of it.
     """
     chosen_pairs = _chosen(
         "--pairs", pairs, schemas.split_pair, {"paper": PAIRS, "all": schemas.pairs()}

@@ -5,8 +5,8 @@ flaky candidates.
 from __future__ import annotations
 
 from ddenv.evidence.rates import miss_chance
-from ddenv.runfile.deeds import deed
 from ddenv.runfile.events import BaselineFinished
+from ddenv.runfile.failure_words import deed
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.text import as_sentence, count, first_of, percent

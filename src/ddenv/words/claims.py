@@ -19,8 +19,8 @@ from ddenv.evidence.claims import (
     never_left_out,
     so_far,
 )
-from ddenv.runfile.deeds import deed
 from ddenv.runfile.events import EndsElsewhere
+from ddenv.runfile.failure_words import deed
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.state import RunState

@@ -17,7 +17,7 @@ from ddenv.evidence.claims import (
     has_dropped,
     only_helping,
 )
-from ddenv.runfile.deeds import DEEDS, deed
+from ddenv.runfile.failure_words import DEEDS, deed
 from ddenv.runfile.fold_tests import seen
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.run_settings import Settings, settings

@@ -21,7 +21,7 @@ from ddenv.evidence.margins import (
     margins_of,
 )
 from ddenv.evidence.rates import anytime_interval
-from ddenv.runfile.deeds import deed
+from ddenv.runfile.failure_words import deed
 from ddenv.runfile.progress import Margins
 from ddenv.runfile.state import RunState
 from ddenv.text import count, duration, percent

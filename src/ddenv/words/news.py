@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 
 from ddenv.evidence.claims import in_the_making, never_left_out
-from ddenv.runfile.deeds import DEEDS
 from ddenv.runfile.events import Implied, TestFinished, TestLost, TestStarted
+from ddenv.runfile.failure_words import DEEDS
 from ddenv.runfile.position import Moment
 from ddenv.runfile.progress import Removal
 from ddenv.runfile.run_settings import settings

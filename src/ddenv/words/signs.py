@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ddenv.runfile.deeds import DEEDS
+from ddenv.runfile.failure_words import DEEDS
 from ddenv.runfile.state import Test
 from ddenv.text import shortened
 

@@ -24,8 +24,8 @@ from ddenv.runs.folder import dropped_run
 from ddenv.text import Data, plain
 from ddenv.workbench.shared.bindings import keys
 from ddenv.workbench.shared.messages import Attention, ShowRun, ShowSetup
+from ddenv.workbench.terminal.cell_diff import CellDiff
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
-from ddenv.workbench.terminal.written import Written
 
 BELL = "\x07"
 # Textual's actions that move the focus.
@@ -132,7 +132,7 @@ class Workbench(App[int]):
         first: Callable[[], Screen[Any]] | None = None,
     ) -> None:
         super().__init__()
-        self._written = Written()
+        self._written = CellDiff()
         self._reading = reading
         for theme in OURS:
             self.register_theme(theme)

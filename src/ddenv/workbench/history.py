@@ -13,7 +13,7 @@ from textual.containers import Horizontal
 from textual.screen import Screen
 from textual.widgets import DataTable, Static
 
-from ddenv.guiding.commands import GoBack, Situation, question, refusal
+from ddenv.guiding.commands import Context, GoBack, question, refusal
 from ddenv.runfile import branches
 from ddenv.runfile.fold_decisions import place
 from ddenv.runfile.progress import Node
@@ -61,7 +61,7 @@ class History(Screen[int | None]):
         ),
     ]
 
-    def __init__(self, look: Callable[[], Situation]) -> None:
+    def __init__(self, look: Callable[[], Context]) -> None:
         """`look` returns the run as it is now."""
         super().__init__()
         self._look_at = look

@@ -17,16 +17,16 @@ from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs
 from ddenv.guiding.commands import (
     Command,
+    Context,
     Isolate,
     Row,
-    Situation,
     StartEngine,
     question,
     said,
     send,
     starts_engine,
 )
-from ddenv.guiding.offers import Offer, Pointed, offer
+from ddenv.guiding.key_offers import KeyOffer, Pointed, offer
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runs import processor
@@ -42,8 +42,8 @@ from ddenv.workbench.shared.processes import Engine
 NAMED = 50
 # The tries that are listed, the latest ones.
 TRIES = 5
-# By the words that are typed: the action of `ddenv.guiding.offers`, the screen's key for it, and
-# what it does.
+# By the words that are typed: the action of `ddenv.guiding.key_offers`, the screen's key for it,
+# and what it does.
 GUIDES = {
     "pause": ("pause", "space", "start no new test; again to resume"),
     "step": ("step", "s", "run one test, then pause"),
@@ -122,7 +122,7 @@ QUESTIONS: dict[str, tuple[Callable[[Snapshot], Iterator[str]], str]] = {
 }
 
 
-def meaning(line: str, now: Situation) -> Offer | None:
+def meaning(line: str, now: Context) -> KeyOffer | None:
     """What a line asks for now; None if it guides nothing. Raises UserError for a row or a model
     that there is not.
     """
@@ -210,7 +210,7 @@ class LineMode:
             print(printable(words), file=self._out, flush=True)
 
     @property
-    def _situation(self) -> Situation:
+    def _situation(self) -> Context:
         snapshot = self._poll.snapshot
         if self._poll.watch:
             barred = WATCHING
@@ -218,7 +218,7 @@ class LineMode:
             barred = "this run file cannot be read"
         else:
             barred = ""
-        return Situation(snapshot.state, snapshot.engine, barred)
+        return Context(snapshot.state, snapshot.engine, barred)
 
     def _do(self, line: str) -> bool:
         """Does what a line asks for; False to leave."""

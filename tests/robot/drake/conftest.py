@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from ddenv.robot.result import RunResult
-from ddenv.robot.simulation.template import Template
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.world.model import Box, Collision, Link, Model, Shape, World
 from ddenv.world.pose import HERE, Pose
 
@@ -55,7 +55,7 @@ def drive(world_of, husky, scenario_of) -> Callable[..., RunResult]:
         )
         road = static("road", piece("road", ROAD, frame @ Pose((EDGE - 3.0, 0.0, -0.05))))
         world: World = replace(world_of(ground=False), models=(road, *models))
-        return Template(world, robot, scenario).run(
+        return Plant(world, robot, scenario).run(
             frozenset(model.name for model in world.models), seed=1
         )
 

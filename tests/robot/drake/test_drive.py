@@ -11,7 +11,7 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.robot.navigation.navigate import Straight
 from ddenv.robot.protocol import STOP, Estimate, Reading, Setup, Twist, WheelSpeeds
-from ddenv.robot.simulation.template import Template
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.world.drive import find_drive, footprint, rolled
 from ddenv.world.model import Box, Capsule, Ellipsoid, Mesh, Model, Shape, Sphere
 from ddenv.world.pose import Pose
@@ -91,7 +91,7 @@ def test_what_turns_about_the_opposite_axis_turns_the_other_way(husky, world_of,
     assert np.sign(drive.wheel_speeds(Twist(1.0, 0.0), 0.5)).tolist() == list(drive.signs)
     named = WheelSpeeds({"rear_left_wheel": 2.0, "front_right_wheel": 3.0})
     assert drive.wheel_speeds(named, 0.5).tolist() == [0.0, -3.0, 2.0, 0.0]
-    assert Template(world_of(), mixed, scenario_of()).run(frozenset(), seed=1).outcome == "pass"
+    assert Plant(world_of(), mixed, scenario_of()).run(frozenset(), seed=1).outcome == "pass"
 
 
 def turned(robot: Model, pose: Pose) -> Model:
@@ -216,7 +216,7 @@ def test_joints_that_are_not_named_turn_freely(husky, world_of, scenario_of):
             "wheels": FRONT.model_dump(),
         }
     )
-    template = Template(world_of(), husky, scenario)
+    template = Plant(world_of(), husky, scenario)
     assert template.context.built.plant.num_actuators() == 2
     assert template.run(frozenset(), seed=1).outcome == "pass"
 
@@ -227,7 +227,7 @@ def test_links_without_mass_are_frames_of_what_they_are_fixed_to(husky, world_of
     tip = link_of("tip", None, Pose(at), mass=None)
     fixed = joint_of("fixed", "base_link", "rod", at), joint_of("fixed", "rod", "tip", at)
     framed = replace(husky, links=(*husky.links, rod, tip), joints=(*husky.joints, *fixed))
-    assert Template(world_of(), framed, scenario_of()).run(frozenset(), seed=1).outcome == "pass"
+    assert Plant(world_of(), framed, scenario_of()).run(frozenset(), seed=1).outcome == "pass"
     loose = replace(framed, joints=(*husky.joints, replace(fixed[0], kind="continuous"), fixed[1]))
     wheels = {
         "model": "husky.sdf",
@@ -237,7 +237,7 @@ def test_links_without_mass_are_frames_of_what_they_are_fixed_to(husky, world_of
     with pytest.raises(
         UserError, match=r"link 'rod' of the moving model 'husky' has no <inertial>"
     ):
-        Template(world_of(), loose, scenario_of(robot=wheels))
+        Plant(world_of(), loose, scenario_of(robot=wheels))
 
 
 def straight(x: float, y: float = 0.0, tolerance: float = 0.5, **settings: float) -> Straight:

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from ddenv.robot.drake import contact_shapes
 from ddenv.robot.drake.contact_shapes import Placed
 from ddenv.robot.result import RunResult
-from ddenv.robot.simulation.template import Template
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.world.files.meshes import convex_hull
 from ddenv.world.model import Box, Collision, Cylinder, Inertia, Link, Mesh, Model, Sphere
 from ddenv.world.pose import HERE, Pose
@@ -174,7 +174,7 @@ def test_nothing_sinks_by_more_than_5_mm(world_of, husky, scenario_of, mass, sha
     )
     world = world_of()
     scenario = scenario_of(failure={"timeout": 2.0}, goal={"x": 9, "y": 0})
-    template = Template(replace(world, models=(*world.models, thing)), husky, scenario)
+    template = Plant(replace(world, models=(*world.models, thing)), husky, scenario)
     template._sleeping = False
     rows = template.run(frozenset({"thing"}), seed=1).motions["thing"]
     assert rows[:, 3].min() > height - 0.005
@@ -203,7 +203,7 @@ def test_the_order_of_models_changes_no_bit(add, world_of, husky, scenario_of, o
     models = [*loose, *posts]
 
     def run(models: list[Model]) -> RunResult:
-        template = Template(add(world_of(), *models), husky, scenario_of(failure={"timeout": 4.0}))
+        template = Plant(add(world_of(), *models), husky, scenario_of(failure={"timeout": 4.0}))
         return template.run(frozenset(model.name for model in models), seed=1)
 
     assert bits(run([models[number] for number in order])) == bits(run(models))

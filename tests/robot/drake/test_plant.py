@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddenv.robot.simulation.template import Template
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.world.drive import find_drive
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
@@ -38,7 +38,7 @@ def motion(world_of, add, husky, scenario_of):
     """
 
     def run(model: Model) -> tuple[np.ndarray, np.ndarray]:
-        template = Template(
+        template = Plant(
             add(world_of(), model, replace(model, name="twin")), husky, scenario_of(**NOWHERE)
         )
         rows = template.run(frozenset({model.name}), seed=1).motions[model.name]
@@ -100,7 +100,7 @@ def test_a_universal_joint_turns_about_both_its_axes_only(motion):
 
 def test_a_joint_without_play_is_fixed(world_of, add, husky, scenario_of):
     held = hung("revolute", axis=(0.0, 1.0, 0.0), lower=0.0, upper=0.0)
-    result = Template(add(world_of(), held), husky, scenario_of(**NOWHERE)).run(
+    result = Plant(add(world_of(), held), husky, scenario_of(**NOWHERE)).run(
         frozenset({"thing"}), seed=1
     )
     assert result.motions == {}
@@ -118,7 +118,7 @@ def test_what_is_fixed_in_the_world_stops_the_robot_and_can_be_removed(
             joint_of("revolute", "foot", "arm", (2.0, 0.0, 1.4), axis=(0.0, 0.0, 1.0)),
         ),
     )
-    template = Template(add(world_of(), post), husky, scenario_of(failure={"timeout": 5.0}))
+    template = Plant(add(world_of(), post), husky, scenario_of(failure={"timeout": 5.0}))
     blocked = template.run(frozenset({"post"}), seed=1)
     assert blocked.outcome == "failed"
     assert blocked.trajectory[:, 1].max() < 1.6
@@ -136,7 +136,7 @@ def test_only_joints_that_turn_about_one_axis_are_wheels(world_of, husky, scenar
         joint = joint_of(kind, "base_link", "load", at, axis2=(1.0, 0.0, 0.0), lower=0.0, upper=0.1)
         robot = replace(husky, links=(*husky.links, load), joints=(*husky.joints, joint))
         assert find_drive(robot) == find_drive(husky)
-        assert Template(world_of(), robot, scenario_of()).run(frozenset(), seed=1).outcome == "pass"
+        assert Plant(world_of(), robot, scenario_of()).run(frozenset(), seed=1).outcome == "pass"
 
 
 def test_a_board_that_is_hit_moves_and_its_motion_is_recorded(world_of, husky, scenario_of, box):
@@ -144,7 +144,7 @@ def test_a_board_that_is_hit_moves_and_its_motion_is_recorded(world_of, husky, s
         box("board", "1.2 0 0.02 0 0 1.57", "0.9 0.09 0.04", mass=2.0),
         box("crate", "1.6 -3 0.25 0 0 0", "0.5 0.5 0.5", mass=10.0),
     )
-    template = Template(
+    template = Plant(
         world_of(board, crate), husky, scenario_of(failure={"timeout": 4.0}, goal={"x": 9, "y": 0})
     )
     result = template.run(frozenset({"board", "crate"}), seed=1)
@@ -168,7 +168,7 @@ def test_a_model_of_several_links_moves_as_one(world_of, husky, scenario_of, box
         f"<link name='b'><pose>0 0 0.2 0 0 0</pose>{inertia}{side}</link>"
         "<joint name='j' type='fixed'><parent>a</parent><child>b</child></joint></model>"
     )
-    template = Template(world_of(pair), husky, scenario_of(failure={"timeout": 2.0}))
+    template = Plant(world_of(pair), husky, scenario_of(failure={"timeout": 2.0}))
     rows = template.run(frozenset({"pair"}), seed=1).motions["pair"]
     assert rows[0, 1:4] == pytest.approx([0, 3, 1])
     assert rows[-1, 3] == pytest.approx(0.1, abs=0.005)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from ddenv.robot.drake import region
-from ddenv.robot.simulation.template import Template, Variants
+from ddenv.robot.simulation.plant_cache import Plant, PlantCache
 from ddenv.world.model import Box, World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario
@@ -47,19 +47,19 @@ def scenario(scenario_of) -> Scenario:
 
 
 @pytest.fixture
-def variants(world, husky, scenario, monkeypatch) -> Callable[[float], Variants]:
+def variants(world, husky, scenario, monkeypatch) -> Callable[[float], PlantCache]:
     """The simulator of the world with a region of a width (m)."""
 
-    def make(width: float) -> Variants:
+    def make(width: float) -> PlantCache:
         monkeypatch.setattr(region, "FEW", EVERYTHING if width == EVERYTHING else 0)
         monkeypatch.setattr(region, "WIDTH", width)
         monkeypatch.setattr(region, "AROUND", width)
-        return Variants(world, husky, scenario)
+        return PlantCache(world, husky, scenario)
 
     return make
 
 
-def still(variants: Variants) -> int:
+def still(variants: PlantCache) -> int:
     """How many models that never move are in the plant."""
     return len(variants._whole.context.built.static)
 
@@ -108,7 +108,7 @@ def test_a_model_that_slides_out_of_the_region_is_stopped_by_what_lies_there(
     expected, found = [], []
     for width, results in ((EVERYTHING, expected), (4.0, found)):
         variants(width)
-        one = Variants(world, husky, scenario)
+        one = PlantCache(world, husky, scenario)
         assert ("stop" in one._whole.context.built.static) is (width == EVERYTHING)
         results += [
             all_bits(one.run(frozenset(keep), 1))
@@ -128,7 +128,7 @@ def test_what_rests_on_what_is_found_where_a_pile_leaves_the_region(variants, wo
 
 
 def test_a_small_world_is_in_the_plant_as_a_whole(world, husky, scenario):
-    template = Template(world, husky, scenario)
+    template = Plant(world, husky, scenario)
     assert template.context.region is None
     assert len(template.context.built.static) == len(world.models)
 
@@ -138,6 +138,6 @@ def test_a_region_has_what_its_edge_cuts_and_all_that_has_no_end(
 ):
     variants(2.0)
     edge = cube("edge", 5.0, 2.1, mass=None), cube("outside", 5.0, 2.3, mass=None)
-    static = Variants(add(world, *edge), husky, scenario)._whole.context.built.static
+    static = PlantCache(add(world, *edge), husky, scenario)._whole.context.built.static
     assert {"ground", "edge", "wall", "shelf"} <= static.keys()
     assert "outside" not in static

@@ -19,7 +19,7 @@ from ddenv.robot.drake.shapes import (
     wheel_friction,
     world_friction,
 )
-from ddenv.robot.simulation.template import Template
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.world.drive import find_drive
 from ddenv.world.extent import shape_bounds
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Sphere
@@ -47,7 +47,7 @@ ACROSS = Pose.from_rpy(0, 0, 0, np.pi / 2, 0, 0)
 )
 def test_the_robot_is_stopped(world_of, add, husky, scenario_of, shape, turn, front):
     wall = model_of("wall", link_of("link", shape, Pose((2.0, 0.0, 0.35)) @ turn, mass=None))
-    template = Template(add(world_of(), wall), husky, scenario_of(failure={"timeout": 5.0}))
+    template = Plant(add(world_of(), wall), husky, scenario_of(failure={"timeout": 5.0}))
     blocked = template.run(frozenset({"wall"}), seed=1)
     assert (blocked.outcome, blocked.failure) == ("failed", "stuck")
     # The robot reaches 0.5 m ahead of its frame; it comes up to the wall, and not through it.
@@ -59,7 +59,7 @@ def test_the_robot_drives_up_a_mesh(world_of, add, husky, scenario_of):
     ramp = model_of(
         "ramp", link_of("link", wedge(3.0, 3.0, 0.5), Pose((2.5, 0.0, 0.25)), mass=None, mu=1.5)
     )
-    template = Template(
+    template = Plant(
         add(world_of(), ramp), husky, scenario_of(goal={"x": 3.0, "y": 0.0, "tolerance": 0.3})
     )
     end = template.run(frozenset({"ramp"}), seed=1)
@@ -83,7 +83,7 @@ def test_a_moving_shape_falls_and_then_rests_on_the_ground(
     world_of, add, husky, scenario_of, shape, turn, height
 ):
     thing = model_of("thing", link_of("link", shape, Pose((0.0, 3.0, height + 0.02)) @ turn))
-    template = Template(
+    template = Plant(
         add(world_of(), thing), husky, scenario_of(failure={"timeout": 3.0}, goal={"x": 9, "y": 0})
     )
     template._sleeping = False
@@ -164,7 +164,7 @@ def drive(
         controller={"speed": speed, "acceleration": 5.0},
         simulation={"time_step": time_step},
     )
-    return Template(world_of(ground), husky, scenario).run(frozenset({"floor"}), seed=1)
+    return Plant(world_of(ground), husky, scenario).run(frozenset({"floor"}), seed=1)
 
 
 # The spheres of a fast wheel come and go within few steps, and each grips a step late: the faster,

@@ -17,7 +17,7 @@ from ddenv.robot.drake import terrain_boxes
 from ddenv.robot.drake.region import Region
 from ddenv.robot.drake.terrain_boxes import MOST, TOLERANCES, boxes
 from ddenv.robot.result import RunResult
-from ddenv.robot.simulation.template import Template, Variants
+from ddenv.robot.simulation.plant_cache import Plant, PlantCache
 from ddenv.world.model import Box, Shape, Terrain, World
 from ddenv.world.pose import HERE, Pose
 from ddenv.world.terrain import height_at
@@ -91,9 +91,7 @@ def test_level_and_tilted_ground_is_one_box_and_a_region_takes_some_of_the_same_
 def drive(world_of, husky, scenario_of) -> Callable[..., RunResult]:
     """A run of the Husky along x, on ground of one shape that is `height` m high at its start."""
 
-    def run(
-        shape: Shape, pose: Pose = HERE, height: float = 0.0, kind: type = Template
-    ) -> RunResult:
+    def run(shape: Shape, pose: Pose = HERE, height: float = 0.0, kind: type = Plant) -> RunResult:
         scenario = scenario_of(
             robot={"model": "husky.sdf", "spawn": {"x": -4.0, "y": 0.0, "z": height + 0.14}},
             goal={"x": 4.0, "y": 0.0, "tolerance": 0.3},
@@ -138,7 +136,7 @@ def test_a_robot_drives_over_hills_in_a_small_region_as_in_a_large_one_and_stops
     assert over.outcome == "pass"
     monkeypatch.setattr("ddenv.robot.drake.region.WIDTH", 3.0)
     again = drive(
-        terrain_of(hills), height=float(hills(np.array(-4.0), np.array(0.0))) + 0.3, kind=Variants
+        terrain_of(hills), height=float(hills(np.array(-4.0), np.array(0.0))) + 0.3, kind=PlantCache
     )
     assert bits(again) == bits(over)
     trench = drive(terrain_of(lambda x, _: -0.6 * (np.abs(x) < 0.6)))
@@ -148,5 +146,5 @@ def test_a_robot_drives_over_hills_in_a_small_region_as_in_a_large_one_and_stops
 def test_rough_terrain_is_as_fine_as_memory_allows(world_of, husky, scenario_of):
     rough = np.random.default_rng(1).uniform(0.0, 0.3, (41, 41))
     ground = model_of("ground", link_of("link", Terrain((20.0, 20.0), rough, "rough"), HERE, None))
-    template = Template(replace(world_of(ground=False), models=(ground,)), husky, scenario_of())
+    template = Plant(replace(world_of(ground=False), models=(ground,)), husky, scenario_of())
     assert 300 < len(template.context.built.static["ground"]) <= MOST

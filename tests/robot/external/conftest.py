@@ -6,7 +6,7 @@ import uuid
 import pytest
 
 from ddenv.robot.external.simulator import ExternalSimulator
-from ddenv.runs.subject import load_parts
+from ddenv.runs.experiment import load_parts
 from tests.robot.external.own import TOKEN, own_scenario, processes_with
 from tests.waiting import wait_until
 

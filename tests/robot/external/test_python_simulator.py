@@ -8,7 +8,7 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.robot.external import python_simulator
 from ddenv.robot.external.python_simulator import PythonSimulator
-from ddenv.runs.subject import load_parts
+from ddenv.runs.experiment import load_parts
 from ddenv.world.load import load_scenario, load_simulator
 from ddenv.world.scenario import Oracle, Spawn
 from ddenv.world.sdf.read import read_world

@@ -284,7 +284,7 @@ def test_a_lack_of_room_for_temporary_files_is_reported(simulator_of, monkeypatc
 KILLED = """
 import os, pathlib, sys
 from ddenv.robot.external.simulator import ExternalSimulator
-from ddenv.runs.subject import load_parts
+from ddenv.runs.experiment import load_parts
 from tests.robot.external.own import SLEEP, own_scenario
 written = pathlib.Path.write_bytes
 pathlib.Path.write_bytes = lambda file, text: (written(file, text), os.kill(os.getpid(), 9))

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from ddenv.robot.drake.plant import MANY
-from ddenv.robot.piles import rehearsal
+from ddenv.robot.piles import pile_simulator
 from ddenv.robot.piles.sleep import BEARS, BORE, GRAVITY, Loads
-from ddenv.robot.simulation.template import Template
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
 from ddenv.world.whole import FALL
@@ -99,8 +99,8 @@ FAR = {
 def template(world_of, add, husky, scenario_of):
     """A template of a flat world with these models."""
 
-    def make(*models: Model, **sections: dict) -> Template:
-        return Template(add(world_of(), *models), husky, scenario_of(**SECTIONS | sections))
+    def make(*models: Model, **sections: dict) -> Plant:
+        return Plant(add(world_of(), *models), husky, scenario_of(**SECTIONS | sections))
 
     return make
 
@@ -148,7 +148,7 @@ def test_boards_that_lie_across_each_other_come_to_rest(template, world_of, husk
         box_model("right", "1 3.4 0.02 0 0 0", BOARD, mass=2.0),
         box_model("across", "1 3.2 0.07 0 0 1.57", BOARD, mass=2.0),
     ]
-    template = Template(world_of(*boards), husky, scenario_of(**SECTIONS))
+    template = Plant(world_of(*boards), husky, scenario_of(**SECTIONS))
     rows = run(template, "left", "right", "across").motions["across"][20:, 1:]
     assert rows[0, 2] == pytest.approx(0.06, abs=0.005)
     assert (rows == rows[0]).all()
@@ -252,7 +252,7 @@ def test_a_carrier_that_is_removed_lets_fall_what_slept_on_it(
 ):
     table = box_model("table", "1 3 0.4 0 0 0", "1 1 0.8")
     world = add(world_of(table), cube("cup", 1.0, 3.0, 0.95))
-    template = Template(world, husky, scenario_of(**SECTIONS))
+    template = Plant(world, husky, scenario_of(**SECTIONS))
     assert run(template, "table", "cup").motions == {}
     assert run(template, "cup").motions["cup"][-1, 3] == pytest.approx(0.15, abs=0.005)
     assert run(template, "table", "cup").motions == {}
@@ -263,7 +263,7 @@ def test_what_falls_out_of_the_world_is_left_alone(add, world_of, husky, scenari
     world = add(
         world_of(table, ground=False), cube("lost", 0.0, 4.0, 0.5), cube("pushed", 1.2, 2.45, 0.15)
     )
-    template = Template(world, husky, scenario_of(**SECTIONS))
+    template = Plant(world, husky, scenario_of(**SECTIONS))
     rows = run(template, "table", "lost", "pushed").motions["lost"]
     assert -1.0 - FALL - 5.0 < rows[-1, 3] < -1.0 - FALL
     assert (rows[-10:, 1:] == rows[-1, 1:]).all()
@@ -273,9 +273,9 @@ def test_what_falls_out_of_the_world_is_left_alone(add, world_of, husky, scenari
 def test_what_moves_longer_than_it_could_be_rehearsed_goes_on_moving(template, monkeypatch):
     swing = flap("flap", 1.0, -3.0, lower=-np.inf, damping=0.0)
     whole = run(template(swing), "flap").motions["flap"]
-    monkeypatch.setattr(rehearsal, "BUDGET", 0.0)
+    monkeypatch.setattr(pile_simulator, "BUDGET", 0.0)
     rest = run(template(swing), "flap").motions["flap"]
-    rehearsed = int(rehearsal.LEAST / 0.1)
+    rehearsed = int(pile_simulator.LEAST / 0.1)
     assert rest[:rehearsed].tobytes() == whole[:rehearsed].tobytes()
     assert rest == pytest.approx(whole, abs=1e-4)
 
@@ -287,7 +287,7 @@ def test_what_cannot_be_rehearsed_is_simulated_with_the_robot(template, monkeypa
         def AdvanceTo(self, _: float) -> None:
             raise RuntimeError("it broke")
 
-    monkeypatch.setattr(rehearsal, "Simulator", Broken)
+    monkeypatch.setattr(pile_simulator, "Simulator", Broken)
     rows = run(template(cube("thing", 1.0, 3.0, 1.0)), "thing").motions["thing"]
     assert rows[-1, 3] == pytest.approx(0.15, abs=0.005)
 
@@ -351,7 +351,7 @@ class Pressed(Loads):
 @pytest.fixture
 def loads(world_of, add, husky, scenario_of):
     board = model_of("board", link_of("link", Box((0.9, 0.1, 0.04)), Pose((3.0, 0.0, 0.02)), MASS))
-    context = Template(add(world_of(), board), husky, scenario_of()).context
+    context = Plant(add(world_of(), board), husky, scenario_of()).context
     loads = Pressed(context, list(context.built.moving.values()))
     loads.lie_down()
     return loads

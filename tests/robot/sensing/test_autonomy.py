@@ -15,7 +15,7 @@ from ddenv.robot.clock import Clock
 from ddenv.robot.protocol import Twist
 from ddenv.robot.sensing import autonomy as filter_module
 from ddenv.robot.sensing.autonomy import Filter, SensorSuite, Truth
-from ddenv.robot.simulation.template import Template
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.world.pose import wrap
 from ddenv.world.scenario import Sensors
 
@@ -35,7 +35,7 @@ class Listener:
 
 
 def listen(world, robot, scenario, seed: int = 1):
-    template = Template(world, robot, scenario)
+    template = Plant(world, robot, scenario)
     listeners = []
 
     def make(setup):
@@ -92,10 +92,8 @@ def test_the_estimate_is_near_the_truth_and_never_the_truth(world_of, husky, sce
 @pytest.mark.rates
 def test_a_compass_that_points_wrong_leads_the_robot_astray(world_of, husky, scenario_of):
     sections = {"goal": {"x": 8, "y": 0, "tolerance": 0.6}, "failure": {"timeout": 20.0}}
-    good = Template(world_of(), husky, scenario_of(sensors=NOISE, **sections))
-    wrong = Template(
-        world_of(), husky, scenario_of(sensors=NOISE | {"compass_bias": 0.5}, **sections)
-    )
+    good = Plant(world_of(), husky, scenario_of(sensors=NOISE, **sections))
+    wrong = Plant(world_of(), husky, scenario_of(sensors=NOISE | {"compass_bias": 0.5}, **sections))
     assert {good.run(frozenset(), seed).outcome for seed in range(4)} == {"pass"}
     results = [wrong.run(frozenset(), seed) for seed in range(4)]
     assert "lost" in {result.failure for result in results}

@@ -11,8 +11,8 @@ import pytest
 
 from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.notice import Notice, in_view
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.robot.simulation.taking_part import ENDLESS, Hull
-from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import bits, box_model, joint_of, link_of, model_of, run
@@ -34,7 +34,7 @@ def without_noticing(monkeypatch, make) -> RunResult:
 
 
 def test_a_wall_is_touched_when_the_robot_is_there(world_of, husky, scenario_of):
-    result = run(Template(world_of(WALL), husky, scenario_of()), "wall")
+    result = run(Plant(world_of(WALL), husky, scenario_of()), "wall")
     assert set(result.first_touched) == {"ground", "wall"}
     # The bumper meets the wall, whose near side is at 1.4 m, within the 0.05 s between two looks at
     # up to 1 m/s.
@@ -48,12 +48,12 @@ def test_what_is_touched_at_the_start_and_at_the_end_counts(world_of, husky, sce
         "robot": {"model": "husky.sdf", "spawn": {"x": 0, "y": 0, "z": 0.13}},
         "failure": {"timeout": 4.0},
     }
-    template = Template(world_of(WALL), husky, scenario_of(**low))
+    template = Plant(world_of(WALL), husky, scenario_of(**low))
     whole = run(template, "wall")
     assert whole.first_touched["ground"] == 0.0
     # The run that ends just then ends before the next command.
     end = whole.first_touched["wall"]
-    short = Template(world_of(WALL), husky, scenario_of(**low | {"failure": {"timeout": end}}))
+    short = Plant(world_of(WALL), husky, scenario_of(**low | {"failure": {"timeout": end}}))
     assert run(short, "wall").first_touched == whole.first_touched
     assert run(short, "wall").simulated_seconds == end
 
@@ -62,7 +62,7 @@ def test_what_is_within_range_is_sensed_before_it_is_touched(world_of, husky, sc
     scenario = scenario_of(sensors={"view_range": 1.0})
     high = box_model("lamp", "1.0 0 1.5 0 0 0", "0.2 0.2 0.2")
     aside = box_model("aside", "0.5 2 0.5 0 0 0", "0.2 0.2 1")
-    result = run(Template(world_of(WALL, high, aside), husky, scenario), "wall", "lamp", "aside")
+    result = run(Plant(world_of(WALL, high, aside), husky, scenario), "wall", "lamp", "aside")
     assert result.first_sensed["wall"] < result.first_touched["wall"]
     assert x_at(result, result.first_sensed["wall"]) == pytest.approx(0.4, abs=0.12)
     # The lamp hangs 1.3 m above: nowhere is it within range, and neither is the post that the robot
@@ -79,19 +79,19 @@ def test_what_is_behind_is_not_sensed_until_the_robot_turns(world_of, husky, sce
         box_model("behind", "-3 2 0.5 0 0 0", "0.2 0.2 1"),
     )
     narrow = {"sensors": {"view_range": 5.0, "view_angle": math.radians(90)}}
-    straight = Template(world_of(*models), husky, scenario_of(**narrow))
+    straight = Plant(world_of(*models), husky, scenario_of(**narrow))
     result = run(straight, "ahead", "behind")
     assert result.first_sensed["ahead"] == 0.0
     assert "behind" not in result.first_sensed
     turning = run(
-        Template(world_of(*models), husky, scenario_of(**narrow, goal={"x": -3, "y": 0})),
+        Plant(world_of(*models), husky, scenario_of(**narrow, goal={"x": -3, "y": 0})),
         "ahead",
         "behind",
     )
     assert turning.first_sensed["behind"] > 0.5
     all_round = {"sensors": {"view_range": 5.0}}
     assert (
-        run(Template(world_of(*models), husky, scenario_of(**all_round)), "behind").first_sensed[
+        run(Plant(world_of(*models), husky, scenario_of(**all_round)), "behind").first_sensed[
             "behind"
         ]
         == 0.0
@@ -101,7 +101,7 @@ def test_what_is_behind_is_not_sensed_until_the_robot_turns(world_of, husky, sce
 def test_removed_models_are_never_noticed(world_of, add, husky, scenario_of):
     crate = model_of("crate", link_of("link", Box((0.3, 0.3, 0.3)), Pose((1.0, 0.0, 0.15))))
     scenario = scenario_of(sensors={"view_range": 20.0}, failure={"timeout": 3.0})
-    template = Template(add(world_of(WALL), crate), husky, scenario)
+    template = Plant(add(world_of(WALL), crate), husky, scenario)
     assert set(run(template, "crate", "wall").first_sensed) == {"ground", "crate", "wall"}
     assert set(run(template, "wall").first_sensed) == {"ground", "wall"}
     assert set(run(template, "crate").first_touched) == {"ground", "crate"}
@@ -118,7 +118,7 @@ def test_a_moving_model_is_sensed_where_it_is_by_now(world_of, add, husky, scena
         update={"controller": scenario.controller.model_copy(update={"speed": 1e-6})}
     )
     far = model_of("far", link_of("link", Sphere(0.2), Pose((0.0, 30.0, 0.2))))
-    result = run(Template(add(world_of(), far, ball), husky, scenario), "ball", "far")
+    result = run(Plant(add(world_of(), far, ball), husky, scenario), "ball", "far")
     assert "far" not in result.first_sensed
     rows = result.motions["ball"]
     seen = np.hypot(rows[:, 2] - 0.2, rows[:, 3] - 0.2 - result.trajectory[:, 3]) <= 6.0
@@ -137,9 +137,7 @@ def test_a_moving_model_that_slept_is_touched_where_the_robot_finds_it(
     door = model_of(
         "door", leaf, joints=(joint_of("revolute", "world", "leaf", (-2.0, 3.25, 0.6)),)
     )
-    template = Template(
-        add(world_of(), *crates, door), husky, scenario_of(failure={"timeout": 3.0})
-    )
+    template = Plant(add(world_of(), *crates, door), husky, scenario_of(failure={"timeout": 3.0}))
     result = run(template, "near", "pushed", "door")
     assert set(result.first_touched) == {"ground", "near"}
     # Contacts are looked at every 0.1 s, and the crate may jump ahead for a moment.
@@ -153,7 +151,7 @@ def test_a_moving_model_that_slept_is_touched_where_the_robot_finds_it(
 def test_what_lies_on_each_other_beside_the_robot_is_not_touched(world_of, add, husky, scenario_of):
     shelf = box_model("shelf", "1 0.6 0.1 0 0 0", "0.4 0.4 0.2")
     cup = model_of("cup", link_of("link", Box((0.3, 0.3, 0.3)), Pose((1.0, 0.58, 0.35))))
-    template = Template(add(world_of(shelf), cup), husky, scenario_of(goal={"x": 3, "y": -0.1}))
+    template = Plant(add(world_of(shelf), cup), husky, scenario_of(goal={"x": 3, "y": -0.1}))
     result = run(template, "shelf", "cup")
     assert result.outcome == "pass"
     assert set(result.first_touched) == {"ground"}
@@ -164,7 +162,7 @@ def test_what_is_touched_out_of_view_was_sensed_then_although_it_is_seen_later(
 ):
     post = box_model("post", "-0.6 0 0.3 0 0 0", "0.22 0.1 0.6")
     sensors = {"view_range": 5.0, "view_angle": math.radians(300)}
-    template = Template(world_of(post), husky, scenario_of(goal={"x": 0, "y": 3}, sensors=sensors))
+    template = Plant(world_of(post), husky, scenario_of(goal={"x": 0, "y": 3}, sensors=sensors))
     result = run(template, "post")
     assert result.first_touched["post"] < 0.2
     assert result.first_sensed["post"] == result.first_touched["post"]
@@ -180,9 +178,7 @@ def test_links_that_are_fixed_in_the_world_are_part_of_their_model(
         joint_of("revolute", "frame", "flap", (1.5, 3.0, 1.2)),
     )
     gate = model_of("gate", frame, flap, joints=joints)
-    result = run(
-        Template(add(world_of(), gate), husky, scenario_of(failure={"timeout": 3.0})), "gate"
-    )
+    result = run(Plant(add(world_of(), gate), husky, scenario_of(failure={"timeout": 3.0})), "gate")
     assert x_at(result, result.first_touched["gate"]) + FRONT == pytest.approx(1.4, abs=0.06)
 
 
@@ -201,7 +197,7 @@ def test_noticing_changes_no_bit_of_a_run_with_moving_models(
     scenario = scenario_of(
         sensors={"view_range": 1.0}, controller={"period": 0.03}, failure={"timeout": 4.0}
     )
-    template = Template(add(world_of(WALL), *tower), husky, scenario)
+    template = Plant(add(world_of(WALL), *tower), husky, scenario)
     template._sleeping = sleeping
     names = [model.name for model in tower]
     result = run(template, *names)

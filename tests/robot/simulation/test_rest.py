@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from ddenv.robot.navigation import navigate
 from ddenv.robot.oracle import Failure, ends_of, judge
 from ddenv.robot.result import Ends
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.robot.simulation.rest import SECONDS, Rest
-from ddenv.robot.simulation.template import Template
 from ddenv.world.scenario import Goal
 from ddenv.world.sdf.read import parse_world
 from tests.robot.conftest import box_model
@@ -32,7 +32,7 @@ def at_the_wall(world_of, husky, scenario_of):
     """A robot spins its wheels at a wall for 3 s; then its estimate says that it is at the goal,
     and it stops.
     """
-    return Template(world_of(WALL), husky, scenario_of(failure={"timeout": 20.0}))
+    return Plant(world_of(WALL), husky, scenario_of(failure={"timeout": 20.0}))
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_while_its_controller_still_drives_a_robot_is_not_at_rest(world_of, husk
     """It stands at a wall for longer than any patience, with wheels that spin towards a goal far
     away.
     """
-    template = Template(
+    template = Plant(
         world_of(WALL), husky, scenario_of(goal={"x": 90.0, "y": 0.0}, failure={"timeout": 14.0})
     )
     result = template.run(EVERYTHING, seed=1)
@@ -80,7 +80,7 @@ def test_a_robot_that_slides_slowly_is_not_stuck(husky, scenario_of, monkeypatch
     text = f'<sdf version="1.9"><world name="w">{gravity}{floor}</world></sdf>'
     scenario = scenario_of(goal={"x": 40.0, "y": 0.0}, failure={"timeout": 40.0})
     template, keep = (
-        Template(parse_world(text.encode(), Path("w.sdf")), husky, scenario),
+        Plant(parse_world(text.encode(), Path("w.sdf")), husky, scenario),
         frozenset({"floor"}),
     )
     result = template.run(keep, seed=1)

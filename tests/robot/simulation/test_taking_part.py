@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.robot.piles.rehearsal import Repertoire
+from ddenv.robot.piles.pile_simulator import PileCache
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.simulation import taking_part
-from ddenv.robot.simulation.template import Template, Variants
+from ddenv.robot.simulation.plant_cache import Plant, PlantCache
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import bits, cube, door, link_of, model_of, wedge
@@ -33,11 +33,11 @@ def still(
 
 
 @pytest.fixture(scope="session")
-def flat(world_of, add, husky, scenario_of) -> Callable[..., Variants]:
+def flat(world_of, add, husky, scenario_of) -> Callable[..., PlantCache]:
     """A simulator of a flat world with these models."""
 
-    def make(*models: Model, **sections: dict) -> Variants:
-        return Variants(add(world_of(), *models), husky, scenario_of(**SECTIONS | sections))
+    def make(*models: Model, **sections: dict) -> PlantCache:
+        return PlantCache(add(world_of(), *models), husky, scenario_of(**SECTIONS | sections))
 
     return make
 
@@ -46,7 +46,7 @@ def names(*models: Model) -> frozenset[str]:
     return frozenset(model.name for model in models)
 
 
-def with_ties(world: Variants, models: frozenset[str], there: frozenset[str]) -> frozenset[str]:
+def with_ties(world: PlantCache, models: frozenset[str], there: frozenset[str]) -> frozenset[str]:
     """`models` with all of `there` that they are tied to."""
     ties = world.ties(there)
     while new := frozenset(other for name, other in ties if name in models) - models:
@@ -59,7 +59,7 @@ def sensed(result: RunResult, names: frozenset[str]) -> dict[str, float]:
 
 
 def is_implied(
-    world: Variants, there: frozenset[str], more: frozenset[str] = frozenset(), seed: int = 1
+    world: PlantCache, there: frozenset[str], more: frozenset[str] = frozenset(), seed: int = 1
 ) -> bool:
     """Whether a run of `there` has the same bits with only what took part, `more` of it, and what
     these are tied to; and senses what took part at the same times.
@@ -135,7 +135,7 @@ def test_what_an_always_kept_model_is_tied_to_takes_part(world_of, add, husky, s
     scenario = scenario_of(**SECTIONS, protected=["ball"])
     assert (
         "shelf"
-        in Variants(add(world_of(), shelf, ball), husky, scenario).run(names(shelf), 1).took_part
+        in PlantCache(add(world_of(), shelf, ball), husky, scenario).run(names(shelf), 1).took_part
     )
 
 
@@ -243,9 +243,9 @@ def test_the_audit_finds_each_kind_of_participant_that_is_forgotten(flat, monkey
     more = {"ties": frozenset({"ball"}), "unusual": frozenset({"lamp"})}
     for kind, world in worlds.items():
         assert is_implied(world, everything[kind], more.get(kind, frozenset())), kind
-    monkeypatch.setattr(Template, "_carriers", lambda *_: frozenset())
+    monkeypatch.setattr(Plant, "_carriers", lambda *_: frozenset())
     assert not is_implied(worlds["carriers"], everything["carriers"])
-    monkeypatch.setattr(Repertoire, "unusual", lambda *_: frozenset())
+    monkeypatch.setattr(PileCache, "unusual", lambda *_: frozenset())
     assert not is_implied(worlds["unusual"], everything["unusual"], more["unusual"])
     monkeypatch.setattr(taking_part.Reached, "_look_around_robot", lambda *_: None)
     assert not is_implied(worlds["robot"], everything["robot"])
@@ -255,5 +255,5 @@ def test_the_audit_finds_each_kind_of_participant_that_is_forgotten(flat, monkey
     assert not is_implied(worlds["lidar"], everything["lidar"])
     monkeypatch.setattr("ddenv.robot.piles.sleep.Sleep.took_part", frozenset())
     assert not is_implied(worlds["asleep"], everything["asleep"])
-    monkeypatch.setattr(Variants, "ties", lambda *_: [])
+    monkeypatch.setattr(PlantCache, "ties", lambda *_: [])
     assert not is_implied(worlds["ties"], everything["ties"], more["ties"])

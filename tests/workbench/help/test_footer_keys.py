@@ -4,7 +4,7 @@ import fake_moments
 import pytest
 from test_snapshots import SMALL, USUAL, settled
 
-from ddenv.learn.shelf import bundled, open_lesson
+from ddenv.learn.catalog import bundled, open_lesson
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.lessons_screen import LessonsScreen

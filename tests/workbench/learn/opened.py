@@ -2,8 +2,8 @@
 
 from contextlib import asynccontextmanager
 
+from ddenv.learn.catalog import bundled
 from ddenv.learn.score import Score
-from ddenv.learn.shelf import bundled
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import keep_score
 from ddenv.workbench.learn.lessons_screen import LessonsScreen

@@ -5,11 +5,11 @@ by step.
 import pytest
 from textual.widgets import OptionList, Static
 
+from ddenv.learn.catalog import LESSONS, bundled, open_lesson
 from ddenv.learn.lesson_course import LETTERS
 from ddenv.learn.score import Score
-from ddenv.learn.shelf import LESSONS, bundled, open_lesson
 from ddenv.runfile.store import RunFile
-from ddenv.runs.remembered import state_file
+from ddenv.runs.preferences import state_file
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
 from ddenv.workbench.learn.lesson_pane import LessonPane, Variables

@@ -8,7 +8,7 @@ import sqlite3
 import pytest
 from textual.widgets import Static
 
-from ddenv.learn.shelf import LESSONS, bundled, open_lesson
+from ddenv.learn.catalog import LESSONS, bundled, open_lesson
 from ddenv.workbench.learn.kept_scores import all_scores
 from ddenv.workbench.learn.race_screen import RacerPane, RaceScreen, race_of_runs
 from tests.command import in_process

@@ -5,7 +5,7 @@ to.
 import pytest
 from textual.widgets import Static
 
-from ddenv.learn.shelf import bundled, open_lesson
+from ddenv.learn.catalog import bundled, open_lesson
 from ddenv.workbench.learn.kept_scores import all_scores
 from ddenv.workbench.learn.lesson_screen import LessonScreen
 from ddenv.workbench.learn.try_screen import TryScreen

@@ -16,7 +16,7 @@ from ddenv.map.footprints import Footprint
 from ddenv.runfile.fold import fold
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.store import Live, RunFile
-from ddenv.runs.subject import read_parts
+from ddenv.runs.experiment import read_parts
 from ddenv.workbench.map.map_words import legend
 from ddenv.workbench.map.place import LAYERS, Place, Way, place_of_run
 from ddenv.workbench.map.world_map import WorldMap

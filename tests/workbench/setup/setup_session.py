@@ -8,7 +8,7 @@ from textual.widgets import Select, Static
 from textual.worker import WorkerCancelled
 
 from ddenv.runfile.store import RunFile
-from ddenv.runs.subject import read_parts
+from ddenv.runs.experiment import read_parts
 from ddenv.words.methods import KINDS
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.map.world_map import WorldMap

@@ -7,7 +7,7 @@ import pytest
 
 from ddenv.cli.command_line import app as command_line
 from ddenv.cli.workbench import open_command
-from ddenv.runs.subject import READING
+from ddenv.runs.experiment import READING
 from ddenv.settings import OPTIONS
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice

@@ -10,7 +10,7 @@ from textual.widgets import Input
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_like, create_run
-from ddenv.runs.subject import read_parts
+from ddenv.runs.experiment import read_parts
 from ddenv.workbench.setup.files import SaveScenario, recent_files, save_scenario, scenario_path
 from ddenv.workbench.setup.setup_screen import SetupScreen
 from ddenv.world.load import load_scenario

@@ -12,9 +12,9 @@ from textual.widgets import Input
 
 from ddenv.errors import UserError
 from ddenv.runs import fetching
+from ddenv.runs.experiment import load_parts, scenario_named
+from ddenv.runs.preferences import state_file
 from ddenv.runs.remedies import KEPT, REMEDIES, remedy, remember_remedies, remembered
-from ddenv.runs.remembered import state_file
-from ddenv.runs.subject import load_parts, scenario_named
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup.missing_files import AskRemedy, MissingList
 from ddenv.world.access import Unusable

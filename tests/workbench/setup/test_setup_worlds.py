@@ -3,8 +3,8 @@
 import pytest
 from textual.widgets import Input, OptionList, Static
 
+from ddenv.runs.preferences import state_file
 from ddenv.runs.remedies import REMEDIES, remembered
-from ddenv.runs.remembered import state_file
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup.files import KEPT, RECENT, FileList, OpenFile, recent_files, remember
 from tests.workbench.setup.setup_session import Opened, write_scenario

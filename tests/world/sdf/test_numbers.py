@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.runs.subject import load_parts
+from ddenv.runs.experiment import load_parts
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.sdf.numbers import NotPossible, changed, check, chosen, numbers_of, part_of
 from ddenv.world.sdf.read import parse_world

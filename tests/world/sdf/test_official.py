@@ -18,7 +18,7 @@ from docs.lessons.toys import TOYS
 
 from ddenv.cli.world import world_lines, world_report
 from ddenv.errors import UserError
-from ddenv.learn.shelf import LESSONS
+from ddenv.learn.catalog import LESSONS
 from ddenv.runfile.store import RunFile
 from ddenv.world.access import MissingFiles
 from ddenv.world.scenario import Reading

@@ -53,7 +53,7 @@ from ddenv.world.scenario import Simulation
 DEEP = -1e5
 DEEPER = -2e5
 APART = 1e3
-MANY = 8  # a model with more shapes than this has a twin with bodies of its own, see `Twin`
+MANY = 8  # a model with more shapes than this has a twin with bodies of its own, see `StaticProxy`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +72,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Twin:
+class StaticProxy:
     """What stands for a model where it lies at rest: `parts`, or where it has many shapes a body
     for each link.
 
@@ -126,7 +126,7 @@ class Built:
     robot: Body
     static: dict[str, tuple[GeometryId, ...]]
     moving: dict[str, Body]
-    twins: dict[str, Twin]
+    twins: dict[str, StaticProxy]
     own_pairs: dict[str, list[tuple[list[GeometryId], list[GeometryId]]]]
     apart: tuple[tuple[GeometrySet, GeometrySet], ...]
 
@@ -268,7 +268,7 @@ def _place_in_order(model: Model) -> tuple[object, ...]:
     return model.pose.position, model.pose.quaternion, repr(shapes), model.name
 
 
-def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
+def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> StaticProxy:
     # Without corners: the model rests on nothing while its twin stands for it.
     solids = [link_solids(model, link, wheels, corners=False) for link in model.links]
     if sum(map(len, solids)) <= MANY:
@@ -286,7 +286,7 @@ def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
                 parts.append(
                     Part(geometry=geometry, link=number, shape=solid.shape, pose=place, away=away)
                 )
-        return Twin(tuple(part.geometry for part in parts), parts=tuple(parts))
+        return StaticProxy(tuple(part.geometry for part in parts), parts=tuple(parts))
     instance = plant.AddModelInstance(f"twin/{model.name}")
     shapes: list[GeometryId] = []
     places: list[tuple[FixedOffsetFrame, RigidTransform]] = []
@@ -298,7 +298,7 @@ def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
         plant.AddJoint(WeldJoint(f"weld/{link.name}", frame, body.body_frame(), RigidTransform()))
         shapes += _register(plant, body, link.pose.inverse(), of_link)
         places.append((frame, away))
-    return Twin(tuple(shapes), places=tuple(places))
+    return StaticProxy(tuple(shapes), places=tuple(places))
 
 
 def _add_moving(

@@ -14,7 +14,7 @@ from pydrake.systems.framework import Context
 
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.clock import Clock
-from ddenv.robot.drake.plant import Body, Built, Twin
+from ddenv.robot.drake.plant import Body, Built, StaticProxy
 from ddenv.robot.drake.region import Region
 from ddenv.robot.drake.shapes import to_drake, transform
 from ddenv.world.pose import Pose
@@ -253,7 +253,7 @@ class Twins:
         """Takes all twins away."""
         self.lift(tuple(self._laid.values()))
 
-    def _put(self, twin: Twin, links: Sequence[RigidTransform] | None) -> None:
+    def _put(self, twin: StaticProxy, links: Sequence[RigidTransform] | None) -> None:
         """Puts a twin where its links are; None: away."""
         for part in twin.parts:
             pose = part.away if links is None else links[part.link] @ part.pose

@@ -50,7 +50,7 @@ SHOWN = 80
 
 
 class PythonSimulator:
-    """Runs a class of the user's as `Template` runs Drake. docs/any-simulator.md says what the
+    """Runs a class of the user's as `Plant` runs Drake. docs/any-simulator.md says what the
     class has to do.
     """
 

@@ -43,7 +43,7 @@ OUTCOMES = {
 
 
 class ExternalSimulator:
-    """Runs a command as `Template` runs Drake. docs/any-simulator.md says what the command has to
+    """Runs a command as `Plant` runs Drake. docs/any-simulator.md says what the command has to
     do.
     """
 

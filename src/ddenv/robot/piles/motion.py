@@ -237,7 +237,7 @@ class Stillness:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Script:
+class PileMotion:
     """How a pile of K models moves alone, with a row for each tick of the clock.
 
     `names` are its models in the order of the plant. `states` (T, E) are the pile's positions and

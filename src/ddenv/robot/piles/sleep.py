@@ -23,7 +23,7 @@ from ddenv.robot.piles.motion import (
     SLOW,
     Links,
     Motion,
-    Script,
+    PileMotion,
     Stillness,
     gaps,
     spread,
@@ -53,7 +53,7 @@ class Sleep:
         self,
         context: RunContext,
         kept: Sequence[Body],
-        scripts: Sequence[Script],
+        scripts: Sequence[PileMotion],
         never: bool = False,
         alone: bool = False,
     ) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 
 from ddenv.learn.score import Score, score_of
-from ddenv.runs.remembered import read_state, write_state
+from ddenv.runs.preferences import read_state, write_state
 from ddenv.text import count
 
 FILE = "lessons.json"

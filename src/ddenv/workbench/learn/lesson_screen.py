@@ -15,9 +15,9 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.learn.attempt import Attempt
+from ddenv.learn.catalog import Opened
 from ddenv.learn.lesson import blocks
 from ddenv.learn.lesson_course import LETTERS, Course
-from ddenv.learn.shelf import Opened
 from ddenv.learn.variables import variables
 from ddenv.runfile.position import Position, Step
 from ddenv.runfile.store import COLUMNS, Live
@@ -33,7 +33,7 @@ from ddenv.workbench.learn.race_screen import RaceScreen
 from ddenv.workbench.learn.try_screen import TryScreen
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.happening import Happening
+from ddenv.workbench.run.explanation_panel import Happening
 from ddenv.workbench.run.snapshot import Moments
 from ddenv.workbench.shared.bindings import HELP, keys
 from ddenv.workbench.shared.observed import Observed

@@ -12,9 +12,9 @@ from textual.binding import Binding
 from textual.widgets import OptionList, Static
 
 from ddenv.errors import UserError
+from ddenv.learn.catalog import bundled, glance, open_lesson
 from ddenv.learn.lesson import Lesson
 from ddenv.learn.score import Score
-from ddenv.learn.shelf import bundled, glance, open_lesson
 from ddenv.text import plain, truncated
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.learn.kept_scores import all_scores, in_words

@@ -176,7 +176,7 @@ def place_of(world: World, scenario: Scenario | None = None) -> Place:
 def place_of_run(path: Path) -> Place:
     """The world and the scenario of a run file. Raises UserError."""
     # Reading scenarios needs pydantic, which is not needed for the first look at a run.
-    from ddenv.runs.subject import read_parts
+    from ddenv.runs.experiment import read_parts
     from ddenv.workbench.shared.observed import Busy, Observed
 
     until = time.monotonic() + PATIENCE

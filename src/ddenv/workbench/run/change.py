@@ -15,7 +15,7 @@ from textual.widgets import Button, Input, Select, Static
 
 from ddenv.errors import UserError
 from ddenv.guiding import commands
-from ddenv.guiding.commands import Situation
+from ddenv.guiding.commands import Context
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import names
@@ -104,7 +104,7 @@ class Change(ModalScreen[commands.Change | None]):
         if wrong:
             raise UserError("; ".join(wrong))
         command = commands.Change(commands.Change(asked).new(self._state))
-        if why := command.refusal(Situation(self._state)):
+        if why := command.refusal(Context(self._state)):
             raise UserError(why)
         return command
 

@@ -1,6 +1,7 @@
 """The keys of the run screen, and which of them the footer shows first.
 
-A key that guides the run has the action `guide`, with its name in `ddenv.guiding.offers.ACTIONS`.
+A key that guides the run has the action `guide`, with its name in
+`ddenv.guiding.key_offers.ACTIONS`.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ddenv.errors import UserError
-from ddenv.guiding.offers import Offer, Pointed, offer
+from ddenv.guiding.key_offers import KeyOffer, Pointed, offer
 from ddenv.runfile.position import Step
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
@@ -28,10 +28,10 @@ from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.place import Place, read_world
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.asking import Asking
 from ddenv.workbench.run.candidate_rows import round_title
 from ddenv.workbench.run.candidates import Candidates
-from ddenv.workbench.run.happening import Happening
+from ddenv.workbench.run.command_sender import CommandSender
+from ddenv.workbench.run.explanation_panel import Happening
 from ddenv.workbench.run.models import Chart, ModelsLeft
 from ddenv.workbench.run.run_keys import (
     BROWSING,
@@ -53,7 +53,7 @@ from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
 
 if TYPE_CHECKING:
-    from ddenv.workbench.run.opening import Opening
+    from ddenv.workbench.run.run_dialogs import Dialogs
 
 SMALLEST = (64, 18)
 WATCHING = "watching only: no key changes anything"
@@ -108,7 +108,7 @@ class RunScreen(Screen[None]):
         self.world = WorldMap(id="map")
         self._legend = MapLines(id="map-lines")
         self._footer = KeyFooter(LOOKING if watch else FIRST, self._keys_here)
-        self.asking = Asking(self, self.poll, self.engine, self._show_asked)
+        self.asking = CommandSender(self, self.poll, self.engine, self._show_asked)
         self._pane = "map"
         # Whether something is not shown yet, whether the next look comes soon, and when the run was
         # shown last.
@@ -119,11 +119,11 @@ class RunScreen(Screen[None]):
         self._stays: tuple[tuple[int, int] | None, int, float] = (None, 0, 0.0)
 
     @cached_property
-    def opening(self) -> Opening:
+    def opening(self) -> Dialogs:
         # All dialogs are loaded with the first one: the screen is shown before.
-        from ddenv.workbench.run.opening import Opening
+        from ddenv.workbench.run.run_dialogs import Dialogs
 
-        return Opening(self)
+        return Dialogs(self)
 
     @property
     def snapshot(self) -> Snapshot:
@@ -328,10 +328,10 @@ class RunScreen(Screen[None]):
             row = None
         return Pointed(row, self.table.following, (*known, *sorted(names.difference(known))))
 
-    def _offer(self, name: str) -> Offer:
-        """What a key does now, by its name in `ddenv.guiding.offers.ACTIONS`."""
+    def _offer(self, name: str) -> KeyOffer:
+        """What a key does now, by its name in `ddenv.guiding.key_offers.ACTIONS`."""
         if self.browsing.is_past:
-            return Offer(why_not=NOT_NOW)
+            return KeyOffer(why_not=NOT_NOW)
         return offer(name, self.asking.situation, self.pointed)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:

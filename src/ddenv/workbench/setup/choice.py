@@ -46,7 +46,7 @@ class Choice:
     def robot(self) -> Model:
         """Raises UserError if its file cannot be read."""
         from ddenv.runfile.store import RunFile
-        from ddenv.runs.subject import read_parts
+        from ddenv.runs.experiment import read_parts
         from ddenv.world.sdf.read import read_model
 
         if not self.run:
@@ -143,7 +143,7 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
     """A scenario, a world or a run file; `options` are the command line's on how to read worlds.
     Raises UserError.
     """
-    from ddenv.runs.subject import read_parts, reading_of, scenario_for_world
+    from ddenv.runs.experiment import read_parts, reading_of, scenario_for_world
     from ddenv.world.load import load_scenario
 
     if path.suffix == ".ddenv":

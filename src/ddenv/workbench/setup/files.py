@@ -20,7 +20,7 @@ from textual.widgets import DirectoryTree, Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
-from ddenv.runs.remembered import read_state, write_state
+from ddenv.runs.preferences import read_state, write_state
 from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open

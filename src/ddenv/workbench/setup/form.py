@@ -166,7 +166,7 @@ def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str
     """`base` with the values of the fields. Raises UserError, or FieldError if a text is not a
     number.
     """
-    from ddenv.runs.subject import with_values
+    from ddenv.runs.experiment import with_values
     from ddenv.world.load import validate
 
     data = base.model_dump(mode="json")

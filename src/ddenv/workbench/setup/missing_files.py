@@ -80,7 +80,7 @@ def read_with_remedies(
     `reading` is the scenario's own, `options` are as on the command line. Raises Unsupported, and
     UserError.
     """
-    from ddenv.runs.subject import reading_of
+    from ddenv.runs.experiment import reading_of
     from ddenv.world.files.resources import fuel_model
     from ddenv.world.sdf.read import read_world
     from ddenv.world.sdf.standin import AUTO

@@ -16,9 +16,9 @@ from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import RunFile
 from ddenv.runs.changes import changes
+from ddenv.runs.experiment import read_parts
 from ddenv.runs.folder import attach_name
-from ddenv.runs.reasons import Parting, nearest, no_reasons, parting_sentence, reasons, sentence
-from ddenv.runs.subject import read_parts
+from ddenv.runs.reasons import Divergence, nearest, no_reasons, parting_sentence, reasons, sentence
 from ddenv.text import Names, Sentences, as_sentence, padded, percent, plain, shortened, told_apart
 from ddenv.words.claims import made_of_usual, meaning, rate, shown
 from ddenv.words.news import isolating
@@ -48,7 +48,7 @@ class Entry:
     gone: Names
     sentence: str
     more: Sentences
-    parting: Parting | None
+    parting: Divergence | None
     ways: tuple[str, str]
     snapshot: Snapshot
     claim: Claim | None = None

@@ -21,7 +21,7 @@ from pydrake.systems.analysis import Simulator
 from ddenv.arrays import Booleans
 from ddenv.robot.drake.plant import Body
 from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.piles.motion import CALM, NEAR, Links, Script, gaps, spread
+from ddenv.robot.piles.motion import CALM, NEAR, Links, PileMotion, gaps, spread
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.settled import Settled
 from ddenv.text import Names
@@ -37,7 +37,7 @@ MEMORY = 200e6  # what the scripts of a world may take in a worker's memory, byt
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class CachedPile:
     """`script` of the pile `names` is valid while exactly `present` of the static models `near` are
     kept.
 
@@ -47,10 +47,10 @@ class Known:
     names: Names
     near: frozenset[str]
     present: frozenset[str]
-    script: Script | None
+    script: PileMotion | None
 
 
-class Repertoire:
+class PileCache:
     """The scripts of one world's piles. `moving` is the number of models that can move in the whole
     of it.
 
@@ -60,7 +60,7 @@ class Repertoire:
 
     def __init__(self, world: World, moving: int) -> None:
         self.moving = moving
-        self._known: dict[Names, list[Known]] = {}
+        self._known: dict[Names, list[CachedPile]] = {}
         self._size = 0
         self._static = {
             model.name: model_bounds(model)
@@ -85,7 +85,7 @@ class Repertoire:
         }
 
     def unusual(
-        self, piles: Iterable[Known], present: frozenset[str], held: frozenset[str]
+        self, piles: Iterable[CachedPile], present: frozenset[str], held: frozenset[str]
     ) -> frozenset[str]:
         """The models of those among `piles` that do not move as in the whole world, and the static
         ones near them.
@@ -105,7 +105,7 @@ class Repertoire:
             name for known in other for name in (*known.names, *(known.near & present))
         )
 
-    def find(self, names: Names, present: frozenset[str]) -> Known | None:
+    def find(self, names: Names, present: frozenset[str]) -> CachedPile | None:
         """The script of the pile `names` in a world that keeps the models `present`; None if it has
         to be rehearsed.
         """
@@ -115,8 +115,8 @@ class Repertoire:
         return None
 
     def add(
-        self, names: Names, present: frozenset[str], script: Script | None, margin: float
-    ) -> Known:
+        self, names: Names, present: frozenset[str], script: PileMotion | None, margin: float
+    ) -> CachedPile:
         """Stores the script of a pile that can touch what is within `margin` (m) of its links."""
         near = frozenset(self._static)
         if script is not None:
@@ -127,7 +127,7 @@ class Repertoire:
             near = frozenset(
                 name for name, box in boxes if (box[0] < high).all() and (low < box[1]).all()
             )
-        known = Known(names, near, near & present, script)
+        known = CachedPile(names, near, near & present, script)
         self._known.setdefault(names, []).append(known)
         # A pile that cannot be rehearsed takes memory, too: the names of all models that stay.
         self._size += 128 * len(near) + (0 if script is None else script.size)
@@ -145,17 +145,17 @@ UPWARDS = 0.5
 LOOKS = 4
 
 
-class Rehearsals:
-    """Simulates the piles of one plant whose scripts are not in the world's `repertoire` yet."""
+class PileSimulator:
+    """Simulates the piles of one plant whose scripts are not in the world's `pile_cache` yet."""
 
-    def __init__(self, repertoire: Repertoire, context: RunContext) -> None:
-        self._repertoire = repertoire
+    def __init__(self, pile_cache: PileCache, context: RunContext) -> None:
+        self._pile_cache = pile_cache
         self._context = context
         self._plant = context.built.plant
         self._bodies = tuple(context.built.moving.values())
         # The same for every run in this world, whatever is kept: removing a model must not end the
         # script of another.
-        self._longest = max(LEAST, BUDGET / max(repertoire.moving, 1))
+        self._longest = max(LEAST, BUDGET / max(pile_cache.moving, 1))
         context.hold.reset()
         # The gaps between all moving models (M, M), and from each to the robot (M,), at the start,
         # m.
@@ -173,13 +173,13 @@ class Rehearsals:
         """Lets the repertoire know the piles of the whole world, with the models `present`, which
         this plant has.
         """
-        if self._repertoire.usual is None:
+        if self._pile_cache.usual is None:
             self._context.presence.remove(frozenset())
-            self._repertoire.usual = {
+            self._pile_cache.usual = {
                 known.names: known.near for known in self.piles(self._bodies, present)
             }
 
-    def piles(self, kept: Sequence[Body], present: frozenset[str]) -> list[Known]:
+    def piles(self, kept: Sequence[Body], present: frozenset[str]) -> list[CachedPile]:
         """All piles of `kept` that start away from the robot, in a world that keeps the models
         `present`.
 
@@ -191,7 +191,7 @@ class Rehearsals:
         near_robot = spread(self._to_robot[numbers] < NEAR, joined)
         return self._known(self._piles(numbers, joined, ~near_robot), present)
 
-    def _settle(self, present: frozenset[str]) -> list[tuple[tuple[Body, ...], Script | None]]:
+    def _settle(self, present: frozenset[str]) -> list[tuple[tuple[Body, ...], PileMotion | None]]:
         """All piles of the plant with their scripts, as if there were no robot. None: the
         simulation broke.
 
@@ -309,7 +309,7 @@ class Rehearsals:
             if upper and lower and upper != lower and upper in built.moving and abs(up) >= UPWARDS:
                 below.setdefault(upper, set()).add(lower)
 
-    def _meetings(self, settled: Sequence[tuple[tuple[Body, ...], Script | None]]) -> Booleans:
+    def _meetings(self, settled: Sequence[tuple[tuple[Body, ...], PileMotion | None]]) -> Booleans:
         """Which moving models (M, M) of two piles come near each other: by the boxes around all
         that a pile passes through.
         """
@@ -327,9 +327,11 @@ class Rehearsals:
         near: Booleans = (apart < NEAR) & (pile_of[:, None] != pile_of)
         return near
 
-    def _known(self, piles: Sequence[tuple[Body, ...]], present: frozenset[str]) -> list[Known]:
+    def _known(
+        self, piles: Sequence[tuple[Body, ...]], present: frozenset[str]
+    ) -> list[CachedPile]:
         return [
-            self._repertoire.find(_names(pile), present) or self._rehearse(pile, present)
+            self._pile_cache.find(_names(pile), present) or self._rehearse(pile, present)
             for pile in piles
         ]
 
@@ -355,7 +357,7 @@ class Rehearsals:
             left &= ~pile
         return piles
 
-    def _rehearse(self, pile: tuple[Body, ...], present: frozenset[str]) -> Known:
+    def _rehearse(self, pile: tuple[Body, ...], present: frozenset[str]) -> CachedPile:
         """Simulates the pile alone until all of it rests or its time is up; there is no script if
         the simulation breaks.
         """
@@ -378,9 +380,9 @@ class Rehearsals:
             margin = (
                 NEAR + max(motion.speed.max() for motion in script.motions) * context.clock.period
             )
-        return self._repertoire.add(_names(pile), present, script, margin)
+        return self._pile_cache.add(_names(pile), present, script, margin)
 
-    def _rows(self, pile: tuple[Body, ...], sleep: Sleep) -> Script:
+    def _rows(self, pile: tuple[Body, ...], sleep: Sleep) -> PileMotion:
         built = self._context.built
         plant_context = self._context.plant_context
         entries = self._context.hold.entries(pile)
@@ -401,7 +403,7 @@ class Rehearsals:
             paces.append(sleep.pace.copy())
             if sleep.at_rest.all() or tick.time >= self._longest:
                 break
-        return Script(
+        return PileMotion(
             names=_names(pile),
             states=np.array(states),
             motions=tuple(motions),

@@ -10,8 +10,8 @@ from pathlib import Path
 import yaml
 
 from ddenv.learn.lesson import Answer, Foretold, Question
-from ddenv.runfile.deeds import deed
 from ddenv.runfile.events import RoundStarted, TestFinished, TestStarted
+from ddenv.runfile.failure_words import deed
 from ddenv.runfile.position import Chapter, Moment, Position
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, Test

@@ -54,7 +54,7 @@ PATIENCE = 1.0
 MOST_BROKEN = 25
 
 
-class Bench:
+class TestScheduler:
     """Makes tests with `pool`, as `control` allows, and records them in `journal`. `rule` judges
     tries of the user.
 

@@ -16,9 +16,9 @@ from ddenv.errors import UserError
 from ddenv.guiding.commands import (
     Accept,
     Command,
+    Context,
     Isolate,
     Reject,
-    Situation,
     StartEngine,
     drops,
     question,
@@ -40,7 +40,7 @@ PATIENCE = 5
 UNTRUSTED = "not done: it starts a program that you do not trust"
 
 
-class Asking:
+class CommandSender:
     """Sends commands for `screen`, and knows which of them the engine has not obeyed yet."""
 
     def __init__(
@@ -67,14 +67,14 @@ class Asking:
         self._sender.shutdown(wait=False)
 
     @property
-    def situation(self) -> Situation:
+    def situation(self) -> Context:
         snapshot = self._poll.snapshot
         last = self._last[1]
         if last is not None and self.waiting_for():
             pending = last.words(snapshot.state).brief
         else:
             pending = ""
-        return Situation(snapshot.state, snapshot.engine, self.barred, pending)
+        return Context(snapshot.state, snapshot.engine, self.barred, pending)
 
     @property
     def barred(self) -> str:
@@ -217,7 +217,7 @@ class Asking:
         """Calls `then` if the user trusts what an engine starts for this run, or says that nothing
         was done.
         """
-        from ddenv.runs.subject import read_scenario
+        from ddenv.runs.experiment import read_scenario
         from ddenv.workbench.widgets.question import once_trusted
 
         try:

@@ -17,7 +17,7 @@ from ddenv.robot.drake.plant import build
 from ddenv.robot.drake.region import LeftRegion, Region
 from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.drake.terrain_boxes import has_terrain, with_boxes
-from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
+from ddenv.robot.piles.pile_simulator import PileCache, PileSimulator
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import Ends, Progress, RunResult
 from ddenv.robot.sensing.autonomy import Autonomy, SensorSuite, setup_of
@@ -41,7 +41,7 @@ YIELD = (
 )
 
 
-class Template:
+class Plant:
     """One plant of a scenario's world. Building it takes seconds; switching models off for a run
     takes milliseconds.
 
@@ -71,7 +71,7 @@ class Template:
         self._setup = setup_of(robot, self._drive, self._clock, scenario)
         self._obstacles = Obstacles.of(world) if scenario.sensors.lidar else None
         self._models = {model.name: model for model in world.models}
-        self.repertoire = Repertoire(world, self._whole.moving)
+        self.pile_cache = PileCache(world, self._whole.moving)
         self._boxes = still_boxes(world)
         # False only to measure what sleeping saves: then all moving models are always simulated.
         self._sleeping = True
@@ -89,7 +89,7 @@ class Template:
         self._surround(Region.of((spawn.x, spawn.y), (goal.x, goal.y), moving))
         self._build(names)
 
-    def without(self, names: frozenset[str]) -> Template:
+    def without(self, names: frozenset[str]) -> Plant:
         """A template of the same world without the moving models `names`: cheaper, and with the
         same bits.
 
@@ -99,7 +99,7 @@ class Template:
         smaller._build(self.names - names)
         return smaller
 
-    def wider(self, place: Point, times: int) -> Template:
+    def wider(self, place: Point, times: int) -> Plant:
         """A template of the same models with a larger region, see `Region.with_place`."""
         wider = copy(self)
         wider._surround(self._region.with_place(place, times))
@@ -151,7 +151,7 @@ class Template:
         at = spawn_pose(scenario.robot.spawn) @ self._robot.pose.inverse()
         watched = self._region if self._far or self._grounds else None
         self.context = RunContext(built, at, self._clock, self._whole.floor, watched)
-        self.rehearsals = Rehearsals(self.repertoire, self.context)
+        self.rehearsals = PileSimulator(self.pile_cache, self.context)
 
     def run(
         self,
@@ -175,7 +175,7 @@ class Template:
         context.presence.remove(removed)
         piles = self.rehearsals.piles(kept, present) if self._sleeping else []
         held = frozenset(context.built.moving) - set(context.built.twins)
-        unusual = self.repertoire.unusual(piles, present, held) | self._carriers(present)
+        unusual = self.pile_cache.unusual(piles, present, held) | self._carriers(present)
         context.diagram_context.SetTime(0.0)
         scripts = [known.script for known in piles if known.script is not None]
         sleep = Sleep(context, kept, scripts, never=not self._sleeping)
@@ -186,7 +186,7 @@ class Template:
             if scenario.sensors.lidar and self._obstacles:
                 movers = [self._models[body.name] for body in kept]
                 lidar = Lidar(scenario.sensors.lidar, self._obstacles, present, movers, suite.lidar)
-            if self.slices and self._sleeping and self.repertoire.usual is not None:
+            if self.slices and self._sleeping and self.pile_cache.usual is not None:
                 reached = Reached(self._solids, self._hull, sleep, present, self._clock.period)
             setup = replace(self._setup, seed=seed)
             controller = self._controllers(setup)
@@ -217,7 +217,7 @@ class Template:
 
     def _carriers(self, present: frozenset[str]) -> frozenset[str]:
         """What those models are tied to that are always kept, among the models `present`."""
-        ties = self.repertoire.ties
+        ties = self.pile_cache.ties
         return frozenset(
             name for always in self._always & set(ties) for name in ties[always] & present
         )
@@ -235,19 +235,19 @@ LARGEST = 1000
 MOST = 4  # the maximum number of smaller plants at a time
 
 
-class Variants:
-    """Runs a scenario as `Template` does, with the same results to the last bit, but in smaller
+class PlantCache:
+    """Runs a scenario as `Plant` does, with the same results to the last bit, but in smaller
     plants where that saves time.
 
     It holds the template of the whole world and the last few smaller ones.
     """
 
     def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
-        """Raises UserError as `Template` does."""
-        self._whole = Template(world, robot, scenario)
+        """Raises UserError as `Plant` does."""
+        self._whole = Plant(world, robot, scenario)
         self._steps = Clock.of(scenario).last
         # The one that was used last comes last.
-        self._smaller: list[Template] = []
+        self._smaller: list[Plant] = []
 
     def run(
         self,
@@ -257,14 +257,14 @@ class Variants:
         ends: Ends | None = None,
         listener: Listener | None = None,
     ) -> RunResult:
-        """As `Template.run`, in a plant that has all that comes near."""
+        """As `Plant.run`, in a plant that has all that comes near."""
         self._learn_piles()
         return self._within(
             lambda _: self._template(keep).run(keep, seed, progress, ends, listener)
         )
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
-        """Which models support which in the whole world; see `Rehearsals.supports`."""
+        """Which models support which in the whole world; see `PileSimulator.supports`."""
         return self._within(lambda whole: whole.rehearsals.supports(whole.names, elements))
 
     def settled(self) -> Settled:
@@ -273,14 +273,14 @@ class Variants:
 
     def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
         """Each of `elements` that starts away from the robot with each one that it is tied to, as
-        `Repertoire.ties`; sorted.
+        `PileCache.ties`; sorted.
 
         None: unknown.
         """
         if not self._whole.slices:
             return None
         self._learn_piles()
-        ties = self._whole.repertoire.ties
+        ties = self._whole.pile_cache.ties
         return sorted(
             (name, other) for name in elements & set(ties) for other in elements & ties[name]
         )
@@ -289,7 +289,7 @@ class Variants:
         """Finds out how the piles of the whole world move, if that is unknown."""
         self._within(lambda whole: whole.rehearsals.learn(whole.names))
 
-    def _within(self, work: Callable[[Template], Result]) -> Result:
+    def _within(self, work: Callable[[Plant], Result]) -> Result:
         """Does `work`, again from its beginning in a larger plant each time that something leaves
         the plant's region.
         """
@@ -305,7 +305,7 @@ class Variants:
             self._whole = self._whole.wider(place, times)
             gc.collect()
 
-    def _template(self, keep: frozenset[str]) -> Template:
+    def _template(self, keep: frozenset[str]) -> Plant:
         """A template that has at least the models `keep`, chosen for the least time of one run."""
         removed = self._whole.removable - keep
         able = [one for one in (self._whole, *self._smaller) if keep <= one.names]

@@ -4,8 +4,8 @@ every recorded run.
 
 import pytest
 
-from ddenv.learn.foretelling import SAID, at_hand, foretelling
 from ddenv.learn.lesson_course import LETTERS, Course
+from ddenv.learn.prediction import SAID, at_hand, foretelling
 from ddenv.runfile.position import position_in
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.store import RunFile

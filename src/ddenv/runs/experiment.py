@@ -17,8 +17,8 @@ from ddenv.runfile.fold import fold, recorded_scenario
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.folder import named, named_file
+from ddenv.runs.preferences import state_file
 from ddenv.runs.remedies import REMEDIES, remembered, with_remedies
-from ddenv.runs.remembered import state_file
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, MeshReading, Value, number_text, put, read
 from ddenv.text import Data, Names, first_of, shortened
@@ -48,7 +48,7 @@ LONGEST = 60
 
 
 @dataclass(frozen=True, kw_only=True)
-class Subject:
+class Experiment:
     """What the robot is run in. Of a run, `run` is its file, and `state` its last one."""
 
     scenario: Scenario
@@ -62,7 +62,9 @@ class Subject:
         return self.world.elements(self.scenario.protected)
 
 
-def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None = None) -> Subject:
+def open_experiment(
+    name: str, given: Mapping[str, Any], announce: Announce | None = None
+) -> Experiment:
     """What `name` stands for: a run if there is one of that name, else a scenario or a world with
     the options `given`.
 
@@ -72,7 +74,7 @@ def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None 
     if kind != "run":
         scenario = scenario_named(name, given, announce)
         world, robot = load_parts(scenario)
-        return Subject(scenario=scenario, world=world, robot=robot)
+        return Experiment(scenario=scenario, world=world, robot=robot)
     if has_options(given):
         raise UserError(
             "--spawn, --goal, --world, --timeout, --model-path, --stand-in, --ignore, --inside "
@@ -356,14 +358,14 @@ def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
 # From a run file.
 
 
-def read_subject(file: RunFile) -> Subject:
+def read_subject(file: RunFile) -> Experiment:
     """The scenario, world and robot of a run, and its state. Raises UserError."""
     scenario, world, robot = read_parts(file)
     state = fold(file.events())
     failure = scenario.failure.model_copy(
         update={"epsilon": read(state.scenario, SETTINGS["epsilon"])}
     )
-    return Subject(
+    return Experiment(
         scenario=scenario.model_copy(update={"failure": failure}),
         world=world,
         robot=robot,
@@ -393,7 +395,7 @@ def read_scenario(run: RunFile) -> Scenario:
 
 
 @contextmanager
-def robot_file(subject: Subject) -> Iterator[Path]:
+def robot_file(subject: Experiment) -> Iterator[Path]:
     """The robot's file; one with the run's own text, as long as this lasts, where the original is
     not on this machine.
     """

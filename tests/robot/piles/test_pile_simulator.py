@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import pytest
 
-from ddenv.robot.piles import rehearsal
-from ddenv.robot.piles.rehearsal import Rehearsals
+from ddenv.robot.piles import pile_simulator
+from ddenv.robot.piles.pile_simulator import PileSimulator
 from ddenv.robot.settled import Settled, moved, notes_on
-from ddenv.robot.simulation.template import Template, Variants
+from ddenv.robot.simulation.plant_cache import Plant, PlantCache
 from ddenv.world.model import Box, Model, Sphere, World
 from ddenv.world.pose import Pose
 from tests.robot.conftest import bits, box_model, cube, link_of, model_of, run, wedge
@@ -28,15 +28,15 @@ def test_a_small_memory_changes_no_bit(world_of, add, husky, scenario_of, monkey
         cube("d", 5, -9, 0.3),
     )
     parts = ["abcd", "bc", "abd", "cd", "abcd"]
-    large = Template(world, husky, scenario_of(**SECTIONS))
+    large = Plant(world, husky, scenario_of(**SECTIONS))
     expected = [bits(run(large, *part)) for part in parts]
     rehearsed = []
-    simulate = Rehearsals._rows
+    simulate = PileSimulator._rows
     monkeypatch.setattr(
-        Rehearsals, "_rows", lambda self, *pile: rehearsed.append(pile) or simulate(self, *pile)
+        PileSimulator, "_rows", lambda self, *pile: rehearsed.append(pile) or simulate(self, *pile)
     )
-    monkeypatch.setattr(rehearsal, "MEMORY", memory)
-    small = Template(world, husky, scenario_of(**SECTIONS))
+    monkeypatch.setattr(pile_simulator, "MEMORY", memory)
+    small = Plant(world, husky, scenario_of(**SECTIONS))
     assert [bits(run(small, *part)) for part in parts] == expected
     # Of the piles b c, d, b, c one at least was made twice.
     assert len(rehearsed) > 4
@@ -82,7 +82,7 @@ def test_a_pile_that_breaks_is_named_and_the_robot_still_runs(
     def breaks(*_):
         raise ValueError("not finite")
 
-    monkeypatch.setattr(Rehearsals, "_rows", breaks)
+    monkeypatch.setattr(PileSimulator, "_rows", breaks)
     world = add(world_of(), cube("breaks", 4, 3, 0.15), cube("apart", 6, 3, 0.15))
     one = simulator(world)
     settled = one.settled()
@@ -129,13 +129,13 @@ def plank(name: str, x: float, y: float, z: float, length: float) -> Model:
 
 @pytest.fixture
 def simulator(husky, scenario_of):
-    def make(world: World, **sections: object) -> Variants:
-        return Variants(world, husky, scenario_of(**SECTIONS | sections))
+    def make(world: World, **sections: object) -> PlantCache:
+        return PlantCache(world, husky, scenario_of(**SECTIONS | sections))
 
     return make
 
 
-def pairs(simulator: Variants, world: World, *protected: str) -> list[tuple[str, str]]:
+def pairs(simulator: PlantCache, world: World, *protected: str) -> list[tuple[str, str]]:
     return simulator(world, protected=protected).supports(
         frozenset(world.elements(frozenset(protected)))
     )
@@ -196,7 +196,7 @@ def test_a_pile_that_cannot_be_simulated_is_taken_as_it_starts(
     def broken(*_: object) -> None:
         raise RuntimeError("it broke")
 
-    monkeypatch.setattr(rehearsal.Simulator, "AdvanceTo", broken)
+    monkeypatch.setattr(pile_simulator.Simulator, "AdvanceTo", broken)
     assert pairs(simulator, add(world_of(SHELF), cube("cup", 1.0, 3.0, 0.9499))) == [
         ("cup", "shelf")
     ]

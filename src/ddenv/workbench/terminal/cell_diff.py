@@ -24,7 +24,7 @@ STRANGE = (AttributeError, IndexError, KeyError, TypeError, ValueError)
 Cell = tuple[str, Style | None] | None
 
 
-class Written:
+class CellDiff:
     """The cells of a terminal, as far as they are known."""
 
     def __init__(self) -> None:
@@ -68,7 +68,7 @@ class Written:
 class _Fewer(CompositorUpdate):
     """An update that writes fewer cells; if it cannot be read, Textual draws it in full."""
 
-    def __init__(self, written: Written, update: ChopsUpdate | LayoutUpdate) -> None:
+    def __init__(self, written: CellDiff, update: ChopsUpdate | LayoutUpdate) -> None:
         self._written = written
         self._update = update
 

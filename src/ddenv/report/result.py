@@ -14,7 +14,7 @@ from ddenv.page.blocks import Block, Cell, Name, Picture, Section, Strong, Table
 from ddenv.report.report_map import picture
 from ddenv.report.run_data import Record
 from ddenv.runfile.supports import drops_without
-from ddenv.runs.reasons import Parting, no_reasons, parting_sentence, sentence
+from ddenv.runs.reasons import Divergence, no_reasons, parting_sentence, sentence
 from ddenv.text import coordinates, count, first_of, plain
 from ddenv.words.claims import rate
 from ddenv.words.margins import HEAD, rows, said
@@ -168,7 +168,7 @@ def _map(
     record: Record,
     kept: frozenset[str],
     gone: Collection[str],
-    one: Parting,
+    one: Divergence,
     name: str,
     words: str,
     named: Collection[str] | None,

@@ -14,7 +14,7 @@ from textual.geometry import Region
 from textual.strip import Strip
 
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.terminal.written import Written
+from ddenv.workbench.terminal.cell_diff import CellDiff
 
 RED, PLAIN = Style.parse("red on black"), Style.parse("white on black")
 CONSOLE = Console(color_system="truecolor", force_terminal=True)
@@ -48,7 +48,7 @@ def shown(*sequences):
 
 
 def test_only_cells_that_changed_are_sent():
-    written = Written()
+    written = CellDiff()
     first = sent(written, layout([("models: 12", PLAIN)], [("rounds: 3", PLAIN)]))
     assert "models: 12" in first and "rounds: 3" in first
     assert sent(written, layout([("models: 12", PLAIN)], [("rounds: 3", PLAIN)])) == ""
@@ -71,10 +71,10 @@ def test_what_is_sent_in_parts_looks_as_if_all_was_sent():
             [("▀█", PLAIN), (" part A ", Style.parse("bold")), ("similar", RED)], [(" " * 17, RED)]
         ),
     ]
-    written = Written()
+    written = CellDiff()
     steps = [sent(written, frame) for frame in frames]
     for number, frame in enumerate(frames, start=1):
-        assert shown(*steps[:number]) == shown(sent(Written(), frame))
+        assert shown(*steps[:number]) == shown(sent(CellDiff(), frame))
 
 
 async def test_all_is_sent_again_to_a_terminal_that_was_left_or_resized(monkeypatch):
@@ -93,7 +93,7 @@ class Stranger(ChopsUpdate):
 
 
 def test_textual_draws_what_is_of_an_unknown_kind_or_made_in_another_way():
-    written, known = Written(), layout([("left right", PLAIN)])
+    written, known = CellDiff(), layout([("left right", PLAIN)])
     sent(written, known)
     stranger = Stranger([{0: Strip([Segment("night", PLAIN)])}], [(0, 0, 5)], [[5]])
     assert written.fewer(stranger) is stranger
@@ -137,7 +137,7 @@ async def test_the_terminal_shows_what_textual_itself_would_show(updates):
     )
     assert {type(update) for update in updates} == {LayoutUpdate, ChopsUpdate}
     assert all(isinstance(update, CompositorUpdate) for update in updates)
-    written = Written()
+    written = CellDiff()
     ours, theirs = {}, {}
     for number, update in enumerate(updates):
         if type(update) is LayoutUpdate:

@@ -8,8 +8,8 @@ import pytest
 
 from ddenv.errors import UserError
 from ddenv.runs.creation import create_run
+from ddenv.runs.experiment import open_experiment, robot_file, scenario_named
 from ddenv.runs.folder import BUNDLED_RUN, find_run, named, runs_folder
-from ddenv.runs.subject import open_subject, robot_file, scenario_named
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from tests.conftest import DATA
 
@@ -62,12 +62,15 @@ def test_a_bundle_is_its_run_but_a_stored_run_of_its_name_comes_first(here):
 def test_a_run_is_opened_with_its_own_scenario_world_and_robot(here):
     scenario = load_scenario(DATA / "wall.yaml")
     create_run(scenario, runs_folder() / "wall-1.ddenv")
-    file, run = open_subject(str(DATA / "wall.yaml"), NOTHING), open_subject("wall-1", NOTHING)
+    file, run = (
+        open_experiment(str(DATA / "wall.yaml"), NOTHING),
+        open_experiment("wall-1", NOTHING),
+    )
     assert file.scenario == run.scenario == scenario
     assert file.elements == run.elements == run.state.elements
     assert file.run is file.state is None
     with pytest.raises(UserError, match="a run keeps its own"):
-        open_subject("wall-1", NOTHING | {"goal": (1.0, 2.0)})
+        open_experiment("wall-1", NOTHING | {"goal": (1.0, 2.0)})
 
 
 def test_the_robot_of_a_run_needs_no_file_of_its_own(here):
@@ -78,7 +81,7 @@ def test_the_robot_of_a_run_needs_no_file_of_its_own(here):
         scenario.model_copy(update={"robot": scenario.robot.model_copy(update={"model": own})}),
         here / "a.ddenv",
     )
-    subject, text = open_subject("a.ddenv", NOTHING), own.read_bytes()
+    subject, text = open_experiment("a.ddenv", NOTHING), own.read_bytes()
     with robot_file(subject) as file:
         assert file == own
     own.unlink()

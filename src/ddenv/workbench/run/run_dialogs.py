@@ -36,7 +36,7 @@ Answer = TypeVar("Answer")
 LISTED = 200
 
 
-class Opening:
+class Dialogs:
     """Opens dialogs above the run screen, and acts on their answers. Those without arguments have
     keys, by their names.
     """

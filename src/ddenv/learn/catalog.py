@@ -11,9 +11,9 @@ from string import Template
 from ddenv.errors import UserError
 from ddenv.learn import lesson_figures
 from ddenv.learn.attempt import Attempt, Oracle, read_oracle
-from ddenv.learn.foretelling import Foretelling, foretelling
 from ddenv.learn.lesson import Lesson, Step
 from ddenv.learn.lesson_figures import Figures
+from ddenv.learn.prediction import Foretelling, foretelling
 from ddenv.learn.race import Play, recorded_play
 from ddenv.learn.reading import Places, read_lesson
 from ddenv.runfile.fold import fold

@@ -25,7 +25,7 @@ class Pointed:
 
 
 @dataclass(frozen=True, slots=True)
-class Offer:
+class KeyOffer:
     """What an action does now: `command` is None if a dialog asks for something first, or if it is
     not possible.
 
@@ -38,27 +38,27 @@ class Offer:
     why_not: str = ""
 
 
-Meaning = Callable[[c.Situation, Pointed], c.Command | c.StartEngine | c.Isolate | None]
+Meaning = Callable[[c.Context, Pointed], c.Command | c.StartEngine | c.Isolate | None]
 
 
-def offer(action: str, now: c.Situation, pointed: Pointed) -> Offer:
+def offer(action: str, now: c.Context, pointed: Pointed) -> KeyOffer:
     """What an action of `ACTIONS` does now."""
     if now.barred:
-        return Offer(why_not=now.barred)
+        return KeyOffer(why_not=now.barred)
     try:
         command = ACTIONS[action](now, pointed)
     except UserError as error:
-        return Offer(why_not=str(error))
+        return KeyOffer(why_not=str(error))
     if command is None:
-        return Offer()
+        return KeyOffer()
     why_not = c.refusal(command, now)
     again = isinstance(command, c.StartEngine) and now.state.engines
     if why_not:
-        return Offer(why_not=why_not)
-    return Offer(command, "resume" if again else _FOOTER.get(type(command), ""))
+        return KeyOffer(why_not=why_not)
+    return KeyOffer(command, "resume" if again else _FOOTER.get(type(command), ""))
 
 
-def _pause(now: c.Situation, _: Pointed) -> c.Command | c.StartEngine:
+def _pause(now: c.Context, _: Pointed) -> c.Command | c.StartEngine:
     if now.engine == "absent":
         return c.StartEngine()
     if now.state.paused:
@@ -66,7 +66,7 @@ def _pause(now: c.Situation, _: Pointed) -> c.Command | c.StartEngine:
     return c.Pause()
 
 
-def _accept(now: c.Situation, pointed: Pointed) -> c.Command:
+def _accept(now: c.Context, pointed: Pointed) -> c.Command:
     """Accept what waits, or else what is under the cursor, or else the last try that shows f."""
     state = now.state
     row = pointed.row
@@ -100,14 +100,14 @@ def nearest_other(state: RunState, row: c.Row) -> Test | None:
     return min(others, key=lambda test: (test.distance is None, test.distance or 0.0), default=None)
 
 
-def _reject(now: c.Situation, _: Pointed) -> c.Command:
+def _reject(now: c.Context, _: Pointed) -> c.Command:
     waits = c.waiting(now.state)
     if now.state.round is None or waits is None:
         raise UserError("there is nothing to reject")
     return c.Reject(now.state.round.number, waits.index)
 
 
-def _veto(now: c.Situation, pointed: Pointed) -> c.Command:
+def _veto(now: c.Context, pointed: Pointed) -> c.Command:
     state = now.state
     row = pointed.row
     if isinstance(row, Trial):
@@ -126,7 +126,7 @@ def _veto(now: c.Situation, pointed: Pointed) -> c.Command:
     return make(state.round.number, row.index)
 
 
-def _pin(now: c.Situation, pointed: Pointed) -> c.Command | None:
+def _pin(now: c.Context, pointed: Pointed) -> c.Command | None:
     if not _any(now.state, pointed.models):
         return None
     state = now.state
@@ -136,7 +136,7 @@ def _pin(now: c.Situation, pointed: Pointed) -> c.Command | None:
     return c.Pin(c.numbers_of(state, (name for name in models if name not in state.pinned)))
 
 
-def _try(now: c.Situation, pointed: Pointed, keep: frozenset[str]) -> c.Command | None:
+def _try(now: c.Context, pointed: Pointed, keep: frozenset[str]) -> c.Command | None:
     if now.state.baseline is None:
         raise UserError(c.NO_FAILURE)
     if _any(now.state, pointed.models):
@@ -144,7 +144,7 @@ def _try(now: c.Situation, pointed: Pointed, keep: frozenset[str]) -> c.Command 
     return None
 
 
-def _leave_out(now: c.Situation, _: Pointed) -> c.Command:
+def _leave_out(now: c.Context, _: Pointed) -> c.Command:
     found = current(now.state)
     helps = () if found is None else only_helping(found)
     if not helps:
@@ -152,7 +152,7 @@ def _leave_out(now: c.Situation, _: Pointed) -> c.Command:
     return c.LeaveOut(c.numbers_of(now.state, helps[:1])[0])
 
 
-def _isolate(now: c.Situation, _: Pointed) -> c.Command | c.Isolate:
+def _isolate(now: c.Context, _: Pointed) -> c.Command | c.Isolate:
     if now.engine != "absent" and now.state.isolating is not None:
         return c.Stop()
     return c.Isolate()

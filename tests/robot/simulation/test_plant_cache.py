@@ -12,8 +12,8 @@ import pytest
 from ddenv.engine.mcap_file import Streams
 from ddenv.errors import UserError
 from ddenv.robot.simulation import template as variants
-from ddenv.robot.simulation.template import Template, Variants
-from ddenv.runs.subject import load_parts
+from ddenv.robot.simulation.plant_cache import Plant, PlantCache
+from ddenv.runs.experiment import load_parts
 from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.model import Box, Model, Sphere, World
 from ddenv.world.pose import Pose
@@ -33,7 +33,7 @@ def same(a, b) -> bool:
 
 
 def test_reaches_its_goal_on_flat_ground(world_of, husky, scenario_of):
-    result = Template(world_of(), husky, scenario_of()).run(NOTHING, seed=1)
+    result = Plant(world_of(), husky, scenario_of()).run(NOTHING, seed=1)
     assert (result.outcome, result.failure) == ("pass", "")
     x, y, z, *_ = result.end_pose
     assert np.hypot(x - 3.0, y) <= 0.5
@@ -50,7 +50,7 @@ def test_trajectory_has_a_row_each_tenth_of_a_second_and_one_at_the_end(
     world_of, husky, scenario_of
 ):
     scenario = scenario_of(failure={"timeout": 1.23}, controller={"period": 0.03})
-    trajectory = Template(world_of(), husky, scenario).run(NOTHING, seed=1).trajectory
+    trajectory = Plant(world_of(), husky, scenario).run(NOTHING, seed=1).trajectory
     assert trajectory.dtype == np.float64
     assert trajectory[:, 0] == pytest.approx([*np.arange(13) * 0.1, 1.23])
     assert trajectory[0, 1:4] == pytest.approx([0, 0, 0.14])
@@ -60,7 +60,7 @@ def test_trajectory_has_a_row_each_tenth_of_a_second_and_one_at_the_end(
 def test_starts_where_the_scenario_says(world_of, husky, scenario_of):
     spawn = {"x": 1.5, "y": -2.0, "z": 0.14, "yaw": 1.0}
     scenario = scenario_of(robot={"model": "husky.sdf", "spawn": spawn}, failure={"timeout": 0.1})
-    start = Template(world_of(), husky, scenario).run(NOTHING, seed=1).trajectory[0]
+    start = Plant(world_of(), husky, scenario).run(NOTHING, seed=1).trajectory[0]
     assert start[1:] == pytest.approx([1.5, -2.0, 0.14, np.cos(0.5), 0, 0, np.sin(0.5)])
 
 
@@ -75,7 +75,7 @@ def test_a_robot_with_a_pose_of_its_own_starts_where_the_scenario_says(
     )
     posed = replace(husky, pose=at @ husky.pose, links=links, joints=joints)
     starts = [
-        Template(world_of(), robot, scenario_of(failure={"timeout": 0.2}))
+        Plant(world_of(), robot, scenario_of(failure={"timeout": 0.2}))
         .run(NOTHING, seed=1)
         .trajectory[0, 1:]
         for robot in (husky, posed)
@@ -84,7 +84,7 @@ def test_a_robot_with_a_pose_of_its_own_starts_where_the_scenario_says(
 
 
 def test_protected_models_and_the_ground_stay(world_of, husky, scenario_of, box):
-    template = Template(
+    template = Plant(
         world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of(protected=("wall",))
     )
     assert same(template.run(NOTHING, seed=1), template.run(frozenset({"wall", "ground"}), seed=1))
@@ -95,9 +95,9 @@ def test_what_others_depend_on_stays(world_of, husky, scenario_of, box):
     world = world_of(
         box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1"), box("lamp", "0 9 0.5 0 0 0", "1 1 1")
     )
-    anchored = Template(replace(world, anchors=frozenset({"wall"})), husky, scenario_of())
+    anchored = Plant(replace(world, anchors=frozenset({"wall"})), husky, scenario_of())
     assert anchored.run(NOTHING, seed=1).failure == "stuck"
-    tied = Template(
+    tied = Plant(
         replace(world, anchors=frozenset({"lamp"}), ties=(("lamp", "wall"),)), husky, scenario_of()
     )
     assert tied.run(NOTHING, seed=1).failure == "stuck"
@@ -105,7 +105,7 @@ def test_what_others_depend_on_stays(world_of, husky, scenario_of, box):
 
 def test_falls_out_of_a_world_without_ground(world_of, husky, scenario_of, box):
     world = world_of(box("table", "0 0 -0.5 0 0 0", "3 3 1"), ground=False)
-    result = Template(world, husky, scenario_of(goal={"x": 50, "y": 0})).run(
+    result = Plant(world, husky, scenario_of(goal={"x": 50, "y": 0})).run(
         frozenset({"table"}), seed=1
     )
     assert (result.outcome, result.failure) == ("failed", "fell")
@@ -115,7 +115,7 @@ def test_falls_out_of_a_world_without_ground(world_of, husky, scenario_of, box):
 
 def test_unknown_models_are_refused(world_of, husky, scenario_of):
     with pytest.raises(ValueError, match="no such model: wal"):
-        Template(world_of(), husky, scenario_of()).run(frozenset({"wal"}), seed=1)
+        Plant(world_of(), husky, scenario_of()).run(frozenset({"wal"}), seed=1)
 
 
 def test_progress_gets_every_row_and_the_models_that_can_move(world_of, husky, scenario_of, box):
@@ -128,7 +128,7 @@ def test_progress_gets_every_row_and_the_models_that_can_move(world_of, husky, s
         rows.append((time_s, *pose))
         places.append(models)
 
-    template = Template(world, husky, scenario_of(failure={"timeout": 6.0}))
+    template = Plant(world, husky, scenario_of(failure={"timeout": 6.0}))
     result = template.run(frozenset({"ball", "wall"}), 1, hear)
     assert np.array(rows).tobytes() == result.trajectory.tobytes()
     assert {name for models in places for name in models} == {"ball"}
@@ -139,7 +139,7 @@ def test_progress_gets_every_row_and_the_models_that_can_move(world_of, husky, s
 
 
 def test_numbers_that_are_not_finite_are_an_error_and_leave_no_trace(world_of, husky, scenario_of):
-    template = Template(world_of(), husky, scenario_of())
+    template = Plant(world_of(), husky, scenario_of())
     before = template.run(NOTHING, seed=1)
 
     def poison(time_s: float, *_: object) -> None:
@@ -154,7 +154,7 @@ def test_numbers_that_are_not_finite_are_an_error_and_leave_no_trace(world_of, h
 
 
 def test_what_breaks_in_progress_is_the_callers(world_of, husky, scenario_of, box):
-    template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of())
+    template = Plant(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of())
     wall = frozenset({"wall"})
     before = template.run(wall, seed=1)
 
@@ -183,11 +183,11 @@ def test_a_world_drake_cannot_simulate_is_the_users(world_of, add, husky, scenar
     )
     for model, complaint in ((ghost, r"ghost.*no <inertial>"), (heavy, ""), (loop, "")):
         with pytest.raises(UserError, match=f"cannot be simulated.*{complaint}"):
-            Template(add(world_of(), model), husky, scenario_of())
+            Plant(add(world_of(), model), husky, scenario_of())
 
 
 def test_a_listener_hears_every_step_and_changes_no_bit(world_of, husky, scenario_of):
-    template = Template(world_of(), husky, scenario_of(failure={"timeout": 1.0}))
+    template = Plant(world_of(), husky, scenario_of(failure={"timeout": 1.0}))
     streams = Streams()
     quiet, heard = template.run(frozenset(), 3), template.run(frozenset(), 3, listener=streams)
     assert heard.trajectory.tobytes() == quiet.trajectory.tobytes()
@@ -210,14 +210,14 @@ def built(monkeypatch) -> list[frozenset[str]]:
     monkeypatch.setattr(variants, "BUILD", 0.0)
     monkeypatch.setattr(variants, "PAIR", 0.0)
     reported: list[frozenset[str]] = []
-    without = Template.without
+    without = Plant.without
 
-    def tell(self: Template, names: frozenset[str]) -> Template:
+    def tell(self: Plant, names: frozenset[str]) -> Plant:
         smaller = without(self, names)
         reported.append(ALL - smaller.names)
         return smaller
 
-    monkeypatch.setattr(Template, "without", tell)
+    monkeypatch.setattr(Plant, "without", tell)
     return reported
 
 
@@ -247,13 +247,13 @@ def test_parts_of_the_rubble_give_the_same_bits_as_in_the_plant_of_all_of_it_in_
     world, robot, scenario = rubble()
     names = world.elements()
     parts = [frozenset(part) for part in (names[:11], names[:6] + names[16:21], names[::6])]
-    whole = Template(world, robot, scenario)
+    whole = Plant(world, robot, scenario)
     expected = [all_bits(whole.run(part, seed=2)) for part in parts]
     touched = {name for *_, (_, first_touched) in expected for name in first_touched}
     # That plant does not know what takes part, so it has times of scans that nobody read, too.
     times = [sensed for *_, (sensed, _) in expected]
     assert touched & whole.removable
-    smaller = Variants(world, robot, scenario)
+    smaller = PlantCache(world, robot, scenario)
     for number in (2, 0, 1, 2, 0):
         *run, (sensed, first_touched) = all_bits(smaller.run(parts[number], seed=2))
         assert sensed.items() <= times[number].items()
@@ -272,7 +272,7 @@ def test_a_script_is_not_played_where_something_static_is_gone_of_a_model_that_w
         joint_of("revolute", "world", "leaf", (1.0, 6.0, 1.0)),
     )
     world = add(world_of(), model_of("a", frame, leaf, joints=joints), cube("b", 1.0, 4.0, 0.8))
-    smaller = Variants(world, husky, scenario)
+    smaller = PlantCache(world, husky, scenario)
     for keep, height in (({"b"}, 0.15), ({"a", "b"}, 0.65), ({"b"}, 0.15)):
         rows = smaller.run(frozenset(keep), 1).motions["b"]
         assert rows[-1, 3] == pytest.approx(height, abs=0.005)
@@ -280,7 +280,7 @@ def test_a_script_is_not_played_where_something_static_is_gone_of_a_model_that_w
 
 @pytest.mark.rates
 def test_a_plant_is_built_once_while_it_is_asked_for(cubes, husky, scenario, built, monkeypatch):
-    smaller = Variants(cubes, husky, scenario)
+    smaller = PlantCache(cubes, husky, scenario)
     for seed in range(3):
         smaller.run(ALL, seed)
         smaller.run(ALL - {"a"}, seed)
@@ -300,14 +300,14 @@ def test_no_plant_is_built_that_costs_more_than_it_saves(
     cubes, husky, scenario, built, monkeypatch, limit
 ):
     monkeypatch.setattr(variants, limit, TOO_DEAR[limit])
-    result = Variants(cubes, husky, scenario).run(ALL - {"d"}, 1)
+    result = PlantCache(cubes, husky, scenario).run(ALL - {"d"}, 1)
     assert not built
-    assert all_bits(result) == all_bits(Template(cubes, husky, scenario).run(ALL - {"d"}, 1))
+    assert all_bits(result) == all_bits(Plant(cubes, husky, scenario).run(ALL - {"d"}, 1))
 
 
 def test_what_is_protected_stays(cubes, husky, scenario, built):
     protected = scenario.model_copy(update={"protected": ("a",)})
-    result = Variants(cubes, husky, protected).run(frozenset({"b"}), 1)
+    result = PlantCache(cubes, husky, protected).run(frozenset({"b"}), 1)
     assert built == [{"c", "d"}]
     assert "a" in result.motions
 
@@ -318,6 +318,6 @@ def test_the_floor_is_that_of_the_whole_world(world_of, husky, scenario_of, box)
     world = world_of(box("table", "0 0 -0.5 0 0 0", "3 3 1"), cellar, ground=False)
     scenario = scenario_of(goal={"x": 50, "y": 0})
     table = frozenset({"table"})
-    assert all_bits(Variants(world, husky, scenario).run(table, 1)) == all_bits(
-        Template(world, husky, scenario).run(table, 1)
+    assert all_bits(PlantCache(world, husky, scenario).run(table, 1)) == all_bits(
+        Plant(world, husky, scenario).run(table, 1)
     )
