@@ -39,6 +39,7 @@ from ddenv.robot.result import Ends, Progress, RunResult
 from ddenv.runfile.events import EngineStarted
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.engine_job import EngineOptions
 from ddenv.runs.experiment import read_parts, with_options
 from ddenv.runs.programs import start_engine
 from ddenv.world.load import SCENARIOS, load_scenario
@@ -131,9 +132,10 @@ def robot() -> None:
     """
     from distributed import LocalCluster
 
-    one, two = speed(1), speed(2)
+    one = speed(EngineOptions(jobs=1))
+    two = speed(EngineOptions(jobs=2))
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        dask = speed(2, cluster=cluster.scheduler_address)
+        dask = speed(EngineOptions(jobs=2, cluster=cluster.scheduler_address))
     print("\n| friction | tests a minute | ratio |\n|---|---|---|")
     print(f"| 1 worker | {one:.1f} | |\n| 2 workers | {two:.1f} | {two / one:.2f} times one |")
     print(f"| 2 workers of Dask | {dask:.1f} | {dask / two:.2f} times two plain ones |")
@@ -190,16 +192,16 @@ def resumed(tests: int) -> float:
         return time.perf_counter() - began
 
 
-def speed(jobs: int, tests: int = 48, **options: str) -> float:
-    """Tests of friction in a minute; `options` are the engine's."""
+def speed(options: EngineOptions, tests: int = 48) -> float:
+    """Tests of friction in a minute."""
     with tempfile.TemporaryDirectory() as folder:
         run = Path(folder) / "run.ddenv"
         create_run(with_options(load_scenario(SCENARIOS / "friction.yaml"), budget=tests), run)
-        start_engine(run, jobs, **options).wait()
+        start_engine(run, options).wait()
         with RunFile(run) as file:
             ended = [event.time for event in file.events() if event.kind == "test_finished"]
     # The first one of each worker also waits for the worker to start.
-    return 60 * (len(ended) - jobs) / (ended[-1] - ended[jobs - 1])
+    return 60 * (len(ended) - options.jobs) / (ended[-1] - ended[options.jobs - 1])
 
 
 if __name__ == "__main__":

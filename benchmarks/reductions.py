@@ -30,6 +30,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.engine_job import EngineOptions
 from ddenv.runs.experiment import load_parts, with_options
 from ddenv.runs.programs import start_engine
 from ddenv.settings import SETTINGS
@@ -108,7 +109,7 @@ def typed(values: dict[str, str]) -> dict[str, float | str]:
 def reduced(scenario: Scenario, path: Path, jobs: int, search_only: bool) -> Reduced:
     create_run(scenario, path)
     began, spent = time.monotonic(), children()
-    engine = start_engine(path, jobs)
+    engine = start_engine(path, EngineOptions(jobs=jobs))
     with largest(engine.pid) as memory, RunFile(path) as file:
         while engine.poll() is None:
             time.sleep(LOOK)

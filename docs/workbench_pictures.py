@@ -33,6 +33,7 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.engine_job import EngineOptions, FindMargins, Reduce
 from ddenv.runs.folder import free_run_path
 from ddenv.runs.programs import start_engine
 from ddenv.workbench.app import Config, Workbench
@@ -165,7 +166,7 @@ def main() -> None:
 async def make_all() -> None:
     # What took part would leave five models, and no round with much to see.
     run = new_run("ditch", slice=False, seed=2)
-    engine = start_engine(run, 1, accept_mode="ask")
+    engine = start_engine(run, EngineOptions(jobs=1, accept_mode="ask"))
     async with opened(run) as pilot:
         await begin(pilot, run, engine)
         await guide(pilot)
@@ -413,8 +414,8 @@ async def tell_why(pilot: Pilot[int]) -> None:
 async def show_margins() -> None:
     """Margins of what is left in the friction world."""
     run = new_run("friction")
-    for options in ({}, {"margins": '["*.friction", "*_0?.y"]', "most_runs": 300}):
-        await asyncio.to_thread(start_engine(run, 2, **options).wait)
+    for job in (Reduce(), FindMargins(globs=("*.friction", "*_0?.y"))):
+        await asyncio.to_thread(start_engine(run, EngineOptions(jobs=2), job).wait)
     async with opened(run) as pilot:
         await press(pilot, "W")
         await drawn(pilot)
@@ -468,12 +469,12 @@ async def branch(pilot: Pilot[int]) -> None:
 async def list_runs() -> None:
     """One run whose engine was killed, and one at work."""
     lost = new_run("friction")
-    engine = start_engine(lost, 1)
+    engine = start_engine(lost, EngineOptions(jobs=1))
     await asyncio.to_thread(wait_for_tests, lost, 12)
     os.killpg(engine.pid, signal.SIGKILL)
     engine.wait()
     works = new_run("rubble")
-    start_engine(works, 1)
+    start_engine(works, EngineOptions(jobs=1))
     await asyncio.to_thread(wait_for_tests, works, 1)
     async with opened(None) as pilot:
         await press(pilot, "R")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from ddenv.cli.summary import summary, summary_lines
+from ddenv.runs.engine_job import Certify, EngineOptions
 from ddenv.runs.folder import runs_folder
 from tests.command import is_one_line
 from tests.workbench import fake_moments, fake_run
@@ -92,10 +93,11 @@ def test_an_engine_makes_at_least_so_many_runs(run, started, command):
     command("certify", run.path, "--jobs", 1)
     command("certify", run.path, "--certify-rate", 0.8, "--jobs", 1)
     # As often as the baseline, if not said otherwise.
+    alone = EngineOptions(jobs=1)
     assert started == [
-        (run.path, 1, {"certify": 40, "certify_rate": None, "cluster": None}),
-        (run.path, 1, {"certify": 4, "certify_rate": None, "cluster": None}),
-        (run.path, 1, {"certify": 4, "certify_rate": 0.8, "cluster": None}),
+        (run.path, alone, Certify(at_least=40)),
+        (run.path, alone, Certify(at_least=4)),
+        (run.path, alone, Certify(at_least=4, certify_rate=0.8)),
     ]
 
 

@@ -5,8 +5,11 @@ import json
 import pytest
 
 from ddenv.cli.follow import Interrupted
+from ddenv.runs.engine_job import EngineOptions, GiveUpIsolation, Isolate
 from tests.command import is_one_line
 from tests.workbench import fake_moments, fake_run
+
+ALONE = EngineOptions(jobs=1)
 
 
 def test_what_is_known_is_said_without_a_test(run, started, command):
@@ -19,15 +22,15 @@ def test_what_is_known_is_said_without_a_test(run, started, command):
     command("isolate", run.path, "--again", "--jobs", 1)
     command("isolate", run.path, "--runs", 50, "--jobs", 1)
     assert started == [
-        (run.path, 1, {"isolate": 0, "cluster": None}),
-        (run.path, 1, {"isolate": 50, "cluster": None}),
+        (run.path, ALONE, Isolate()),
+        (run.path, ALONE, Isolate(at_least=50)),
     ]
 
 
 def test_one_that_was_stopped_goes_on(run, started, command):
     fake_moments.isolating(run).write("engine_stopped", reason="stopped by the user")
     done = command("isolate", run.path, "--jobs", 1)
-    assert started == [(run.path, 1, {"isolate": 0, "cluster": None})]
+    assert started == [(run.path, ALONE, Isolate())]
     # No engine works here.
     stopped = (
         f"the search for a world that passes was stopped; continue with: ddenv isolate {run.path}"
@@ -44,14 +47,14 @@ def test_who_is_interrupted_reads_how_to_go_on(run, started, monkeypatch, comman
 
     monkeypatch.setattr("ddenv.cli.follow.follow", interrupted)
     done = command("isolate", run.path, "--jobs", 1)
-    assert (done.returncode, started) == (130, [(run.path, 1, {"isolate": 0, "cluster": None})])
+    assert (done.returncode, started) == (130, [(run.path, ALONE, Isolate())])
     assert f"continue with: ddenv isolate {run.path}" in done.stderr
 
 
 def test_one_that_was_interrupted_can_be_given_up(run, started, command):
     fake_moments.isolating(run).write("engine_stopped", reason="stopped by the user")
     done = command("isolate", run.path, "--give-up")
-    assert (done.returncode, started) == (0, [(run.path, 1, {"give_up": "yes"})])
+    assert (done.returncode, started) == (0, [(run.path, ALONE, GiveUpIsolation())])
     run.write("isolation_given_up")
     assert (run.state.status, run.state.certified) == ("finished", True)
     again = command("isolate", run.path, "--give-up")

@@ -9,6 +9,7 @@ from collections import Counter
 from ddenv.cli.follow import Interrupted
 from ddenv.report.bundle import write_bundle
 from ddenv.report.report import write_report
+from ddenv.runs.engine_job import EngineOptions, FindMargins, Reduce
 from ddenv.words.margins import bar, rows
 from tests.command import is_one_line
 from tests.workbench import fake_moments
@@ -28,8 +29,8 @@ FIX = (
 def test_the_table_and_its_sentences_stand_everywhere(run, started, tmp_path, command):
     fake_moments.with_margins(run)
     done = command("margins", run.path, "--number", "crate_0*", "--jobs", 1)
-    asked = {"margins": '["crate_0*"]', "most_runs": 300, "cluster": None}
-    assert (done.returncode, started) == (0, [(run.path, 1, asked)])
+    job = FindMargins(globs=("crate_0*",), most_runs=300)
+    assert (done.returncode, started) == (0, [(run.path, EngineOptions(jobs=1), job)])
     said = done.stdout.splitlines()
     assert said[0].split() == ["number", "now", "f", "until", "instead", "runs"]
     assert said[1].split() == [
@@ -196,7 +197,9 @@ def test_who_is_interrupted_reads_how_to_go_on(run, monkeypatch, command):
     assert done.returncode == 130
     assert f"continue with: ddenv margins {run.path}\n" in done.stderr
     asked = []
-    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_, **more: asked.append(more))
+    monkeypatch.setattr(
+        "ddenv.runs.programs.start_engine", lambda path, options, job: asked.append(job)
+    )
     command("margins", run.path)
     command("margins", run.path, "--budget", 70)
-    assert asked == [{"cluster": None}, {"cluster": None, "margins": "[]", "most_runs": 70}]
+    assert asked == [Reduce(), FindMargins(most_runs=70)]

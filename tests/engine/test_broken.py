@@ -17,6 +17,7 @@ from ddenv.engine.scheduler import MOST_BROKEN
 from ddenv.engine.worker import Run
 from ddenv.errors import UserError
 from ddenv.runs.creation import create_run
+from ddenv.runs.engine_job import EngineOptions
 from ddenv.runs.experiment import load_parts
 from ddenv.runs.programs import start_engine
 from ddenv.runs.trust import program_of, trust
@@ -116,7 +117,7 @@ def test_a_command_that_went_missing_is_told(tmp_path):
 def test_an_engine_that_ends_takes_its_commands_along(tmp_path, token, way):
     run = tmp_path / "run.ddenv"
     create_trusted(own_scenario(tmp_path, FAMILY + SLEEP), run)
-    engine = start_engine(run, 2)
+    engine = start_engine(run, EngineOptions(jobs=2))
     wait_until(lambda: len(processes_with(token, COMMAND)) >= 6)
     if way == "stopped":
         send(run, "stop")

@@ -13,6 +13,7 @@ import pytest
 
 from ddenv.runfile.state import BROKEN
 from ddenv.runs.creation import create_run
+from ddenv.runs.engine_job import EngineOptions
 from ddenv.runs.programs import last_words, start_engine
 from ddenv.runs.trust import program_of, trust
 from ddenv.world.scenario import Oracle
@@ -75,7 +76,7 @@ def lives(run: Path, dice: random.Random, most: int) -> int:
     there were, at most `most`.
     """
     before = how_many_began(run)
-    engine = start_engine(run, 2, anyway="yes")
+    engine = start_engine(run, EngineOptions(jobs=2, ignore_crashes=True))
     kills, began, early = 0, math.inf, dice.randrange(ONE_IN) == 0
     moments = sorted(dice.uniform(0.0, EARLY if early else LIFE) for _ in range(min(2, most)))
     while engine.poll() is None and kills < len(moments):
@@ -121,7 +122,9 @@ def came_of(run: Path) -> Counter:
 def test_killed_at_random_moments_it_ends_as_if_nothing_had_happened(tmp_path, monkeypatch):
     monkeypatch.setenv("DDENV_HOME", str(tmp_path / "home"))
     undisturbed = new_run(tmp_path, "undisturbed")
-    assert start_engine(undisturbed, 2).wait(PATIENCE) == 0, last_words(undisturbed)
+    assert start_engine(undisturbed, EngineOptions(jobs=2)).wait(PATIENCE) == 0, last_words(
+        undisturbed
+    )
     expected, dice = what_became(undisturbed), random.Random(KILLS)
     left, number, came = KILLS, 0, Counter()
     while left > 0:

@@ -9,7 +9,7 @@ import pytest
 
 from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.margins import find_margins
+from ddenv.engine.margins import Stood, find_margins
 from ddenv.engine.pool import Pool
 from ddenv.engine.worker import Run
 from ddenv.errors import UserError
@@ -19,6 +19,7 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.store import RunFile
 from ddenv.runs.changes import beside, changed_run, changes
 from ddenv.runs.creation import create_run
+from ddenv.runs.engine_job import FindMargins
 from ddenv.runs.experiment import load_parts, read_parts
 from ddenv.runs.export import export_world
 from ddenv.runs.playback import played
@@ -55,8 +56,9 @@ def work(path, pool, globs=GLOBS, budget=300, prepare=lambda _: None, **options)
     with engine(path, pool, prepare=prepare, **options) as one:
         with RunFile(path) as file:
             parts = read_parts(file)
-        asked = None if globs is None else (globs, budget)
-        find_margins(parts, one.journal, pool, one.control, asked, (before.status, before.reason))
+        asked = None if globs is None else FindMargins(globs=tuple(globs), most_runs=budget)
+        stood = Stood(status=before.status, reason=before.reason)
+        find_margins(parts, one.journal, pool, one.control, asked, stood)
         return one.journal.state
 
 

@@ -13,6 +13,7 @@ import pytest
 from ddenv.runfile.integrity import faults, whole
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.engine_job import EngineOptions
 from ddenv.runs.programs import start_engine
 from tests.engine.reading import state_of
 from tests.waiting import wait_until
@@ -37,7 +38,7 @@ def path(tmp_path):
 
 @pytest.fixture
 def engine(path):
-    process = start_engine(path, 2)
+    process = start_engine(path, EngineOptions(jobs=2))
     yield process
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGCONT)

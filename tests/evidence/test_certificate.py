@@ -35,10 +35,10 @@ chances = st.sampled_from([0.0, 0.4, 0.7, 0.9, 1.0])
 rates = st.tuples(chances, chances, chances)
 terms = st.builds(
     Terms,
-    st.floats(0.3, 0.9),
-    st.floats(0.3, 0.95),
-    st.sampled_from([0.03, 0.002]),
-    st.integers(1, 30),
+    certify_rate=st.floats(0.3, 0.9),
+    keep_rate=st.floats(0.3, 0.95),
+    error=st.sampled_from([0.03, 0.002]),
+    at_least=st.integers(1, 30),
 )
 PROCEDURES = {
     "keeps": lambda terms: keeps(LEFT, WHOLE, terms),

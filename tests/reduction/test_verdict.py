@@ -12,14 +12,14 @@ from ddenv.evidence.rates import estimated_rate
 from ddenv.reduction.verdict import MOST_RUNS, Acceptance, decided_by, standing
 from tests.tiers import slow
 
-firsts = st.builds(Acceptance, st.integers(1, 4))
+firsts = st.builds(Acceptance, most_misses=st.integers(1, 4))
 broke = st.sets(st.integers(0, 9), max_size=4).map(lambda runs: tuple(sorted(runs)))
 keeping = st.builds(
     Acceptance,
-    st.integers(1, 12),
-    st.floats(0.05, 1),
-    st.floats(0.3, 0.95),
-    st.integers(0, 3),
+    most_misses=st.integers(1, 12),
+    rate=st.floats(0.05, 1),
+    keep_rate=st.floats(0.3, 0.95),
+    steps_back=st.integers(0, 3),
     broke=broke,
 )
 rules = firsts | keeping

@@ -167,11 +167,12 @@ def test_a_mailed_run_starts_nothing(scenario, home, words, brings, command):
 @pytest.mark.programs
 @pytest.mark.parametrize("brings", ["command", "controller"])
 def test_no_engine_starts_it_either(scenario, home, brings):
+    from ddenv.runs.engine_job import EngineOptions
     from ddenv.runs.programs import last_words, start_engine
 
     run = home / "mail.ddenv"
     create_run(load_scenario(scenario(BRINGS[brings])), run)
-    assert start_engine(run, 1).wait(60) == 2
+    assert start_engine(run, EngineOptions(jobs=1)).wait(60) == 2
     assert "would start the" in last_words(run)
     assert not (home / "started").exists()
 

@@ -5,7 +5,6 @@ programs.
 from __future__ import annotations
 
 import threading
-from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from ddenv.engine import __main__ as program
 from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
+from ddenv.runs.engine_job import EngineOptions, Order, Reduce
 from ddenv.runs.programs import ENGINE_SAYS
 from ddenv.study import conduct
 from tests.engine.fake import FakePool
@@ -27,19 +27,11 @@ class Killed(BaseException):
 class Engine:
     """An engine that begins to work on `run` at once, as far as a study looks at its process."""
 
-    def __init__(self, lab: Lab, run: Path, jobs: int, share: Path | None = None) -> None:
+    def __init__(self, lab: Lab, run: Path, options: EngineOptions) -> None:
         self._lab, self._run = lab, run
-        given = {
-            "jobs": jobs,
-            "cluster": None,
-            "share": share,
-            "after": None,
-            "anyway": "no",
-            "attended": "no",
-        }
-        self._options = Namespace(
-            accept_mode="automatic", bits="same", certify=None, isolate=None, margins=None, **given
-        )
+        with RunFile(run) as file:
+            last = file.last_command()
+        self._order = Order(job=Reduce(), options=options, last_command=last)
         self._terminated = threading.Event()
         self._code: int | None = None
         threading.Thread(target=self._work, daemon=True).start()
@@ -54,7 +46,7 @@ class Engine:
         log = self._run.with_name(f"{self._run.name}.log")
         try:
             with RunFile(self._run) as file, engine_lock(self._run):
-                self._code = program._work(file, self._options, self._terminated)
+                self._code = program.work(file, self._order, self._terminated)
         except UserError as error:
             log.write_text(f"{ENGINE_SAYS} {error}\n")
             self._code = 2
@@ -85,11 +77,9 @@ class Lab:
         # No program starts.
         monkeypatch.setattr(program, "check_trusted", lambda *_: None)
 
-    def start_engine(
-        self, run: Path, jobs: int, accept_mode: str = "automatic", share: Path | None = None
-    ) -> Engine:
-        self.started.append((run.stem, jobs))
-        return Engine(self, run, jobs, share)
+    def start_engine(self, run: Path, options: EngineOptions) -> Engine:
+        self.started.append((run.stem, options.jobs))
+        return Engine(self, run, options)
 
     def _parts(self, file: RunFile):
         scenario, world, robot = _read_parts(file)

@@ -18,6 +18,7 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.engine_job import EngineOptions
 from ddenv.study.conduct import Runner, conduct
 from ddenv.study.folder import sessions
 from ddenv.study.plan import run_path
@@ -222,7 +223,7 @@ def orphan(lab, folder, plan, gate):
     """An engine that an earlier study left; it goes on to its end once `gate` is set."""
     (cell,) = plan.cells
     lab.before = lambda run, made: gate.wait(PATIENCE)
-    engine = lab.start_engine(run_path(folder, cell), 1)
+    engine = lab.start_engine(run_path(folder, cell), EngineOptions(jobs=1))
     wait_until(lambda: engine_is_alive(run_path(folder, cell)))
     return engine
 

@@ -65,13 +65,13 @@ def scenarios(tmp_path, monkeypatch) -> Path:
 
 @pytest.fixture
 def started(monkeypatch) -> list[tuple]:
-    """What engines were started with, instead of starting them: the run's file name, jobs and
-    options.
+    """What engines were started with, instead of starting them: the run's file name,
+    the options and the job.
     """
     calls = []
 
-    def start_engine(path, jobs, **options):
-        calls.append((path.name, jobs, options))
+    def start_engine(path, options, job):
+        calls.append((path.name, options, job))
         return SimpleNamespace(poll=lambda: None)
 
     monkeypatch.setattr("ddenv.runs.programs.start_engine", start_engine)

@@ -17,6 +17,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.state import FIRST_FRESH_RUN, RunState
 from ddenv.runfile.store import ROBOT, Live, Motions, RunFile, create
+from ddenv.runs.engine_job import EngineOptions
 from ddenv.settings import PRINTED
 from ddenv.world.sdf.read import parse_world
 from tests.shorthand import Writing
@@ -26,6 +27,11 @@ ROBOT_SDF = b"""<sdf version="1.9"><model name="robot"><link name="base">
 SIZE = (1.2, 0.8, 0.3)
 # Where runs end in f, and in another failure, m.
 END, OTHER_END = (2.0, 0.4, 0.2), (3.0, 1.4, 0.2)
+
+
+def attended(jobs: int, accept_mode: str = "automatic") -> EngineOptions:
+    """How the workbench starts an engine."""
+    return EngineOptions(jobs=jobs, accept_mode=accept_mode, attended=True)
 
 
 def box(

@@ -14,6 +14,7 @@ from test_app import told
 from textual.widgets import Static
 
 from ddenv.errors import UserError
+from ddenv.runs.engine_job import Reduce
 from ddenv.schemas import explanation
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.dialogs import Pick, SideBySide
@@ -243,7 +244,7 @@ async def test_space_or_r_starts_the_engine_of_a_run_that_has_none(run, started)
         await session.press("s")
         assert "space starts one" in session.said()
         await session.press("space")
-        assert started == [(run.path.name, 2, {"accept_mode": "automatic", "attended": "yes"})]
+        assert started == [(run.path.name, fake_run.attended(2), Reduce())]
         await session.look()
         assert "engine starts" in session.text("#status")
         await session.press("r")

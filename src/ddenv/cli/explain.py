@@ -16,9 +16,6 @@ from ddenv.cli.terminal import announce, say
 from ddenv.errors import UserError
 from ddenv.runs.folder import attach_name, find_run
 
-# Of a search for margins, runs.
-BUDGET = 300
-
 
 @click.command("why")
 @options.run_argument
@@ -87,6 +84,8 @@ def isolate_command(
     from ddenv.guiding.commands import Context, Isolate
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
+    from ddenv.runs import engine_job
+    from ddenv.runs.engine_job import EngineOptions
     from ddenv.runs.programs import start_engine
     from ddenv.runs.reasons import nearest
 
@@ -96,13 +95,16 @@ def isolate_command(
             raise UserError(
                 f"{path}: no search for the nearest world that passes is open: nothing to give up"
             )
-        follow(path, start_engine(path, 1, give_up="yes"), as_json)
+        follow(
+            path, start_engine(path, EngineOptions(jobs=1), engine_job.GiveUpIsolation()), as_json
+        )
         return 0
     if why := Isolate(again=True).refusal(Context(state, "absent")):
         raise UserError(f"{path}: {why}: ddenv resume {attach_name(path)}")
     if state.isolated is None or state.isolating is not None or again or runs is not None:
+        work = EngineOptions(jobs=jobs, cluster=cluster)
         try:
-            follow(path, start_engine(path, jobs, isolate=runs or 0, cluster=cluster), as_json)
+            follow(path, start_engine(path, work, engine_job.Isolate(at_least=runs)), as_json)
         except Interrupted as interrupted:
             if interrupted.state.isolating is not None or interrupted.state.isolated is None:
                 announce(
@@ -169,6 +171,7 @@ def margins_command(
     from ddenv.evidence.margins import fixes_of
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
+    from ddenv.runs.engine_job import MOST_RUNS, EngineOptions, FindMargins, Job, Reduce
     from ddenv.runs.experiment import read_parts
     from ddenv.runs.programs import last_words, start_engine
     from ddenv.words.margins import lines, rows
@@ -187,10 +190,12 @@ def margins_command(
                 ).rstrip()
             )
         return 0
-    goes_on = state.margining is not None and not globs and budget is None
-    asked = {} if goes_on else {"margins": json.dumps(globs), "most_runs": budget or BUDGET}
+    job: Job = FindMargins(globs=globs, most_runs=budget or MOST_RUNS)
+    if state.margining is not None and not globs and budget is None:
+        job = Reduce()
     try:
-        follow(path, start_engine(path, jobs, cluster=cluster, **asked), as_json)
+        engine = start_engine(path, EngineOptions(jobs=jobs, cluster=cluster), job)
+        follow(path, engine, as_json)
     except Interrupted as interrupted:
         if interrupted.state.margining is not None:
             announce(f"interrupted; all runs are kept; continue with: ddenv margins {path}")

@@ -66,6 +66,7 @@ def run_command(
     """
     from ddenv.cli.follow import follow_to_summary
     from ddenv.runs.creation import create_named
+    from ddenv.runs.engine_job import EngineOptions
     from ddenv.runs.export import export_world
     from ddenv.runs.programs import start_engine
 
@@ -73,7 +74,7 @@ def run_command(
         given["accept_rate"] = "exact"
     path, world = create_named(scenario, given, asking(trust), name, output, announce)
     announce_notes(world, as_json)
-    code, state = follow_to_summary(path, start_engine(path, jobs), as_json)
+    code, state = follow_to_summary(path, start_engine(path, EngineOptions(jobs=jobs)), as_json)
     if output is not None and is_world(output) and state.baseline is not None:
         announce_needs(output, export_world(path, output, None).needs)
     return code
@@ -135,6 +136,7 @@ def resume_command(
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
     from ddenv.runs.creation import create_like
+    from ddenv.runs.engine_job import EngineOptions
     from ddenv.runs.programs import start_engine
     from ddenv.runs.trust import trusted_scenario
 
@@ -175,11 +177,13 @@ def resume_command(
                 ):
                     file.send("resume")
     # Without a screen there is nobody to ask.
-    how = {
-        "bits": "mixed" if mixed else "same",
-        "anyway": "yes" if anyway else "no",
-        "accept_mode": "automatic",
-    }
+    how = EngineOptions(
+        jobs=jobs,
+        cluster=cluster,
+        accept_mode="automatic",
+        allow_other_machine=mixed,
+        ignore_crashes=anyway,
+    )
     if again:
         if timeout is not None:
             failure = scenario.failure.model_copy(update={"timeout": timeout})
@@ -188,8 +192,8 @@ def resume_command(
         create_like(path, scenario, copy)
         announce(f"repeating the tests of {path} in {copy}")
         path = copy
-        how = {}
-    return follow_to_summary(path, start_engine(path, jobs, cluster=cluster, **how), as_json)[0]
+        how = EngineOptions(jobs=jobs, cluster=cluster)
+    return follow_to_summary(path, start_engine(path, how), as_json)[0]
 
 
 @click.command("certify")
@@ -224,6 +228,7 @@ def certify_command(
     """
     from ddenv.cli.follow import follow_to_summary
     from ddenv.runfile.run_settings import settings
+    from ddenv.runs.engine_job import Certify, EngineOptions
     from ddenv.runs.programs import start_engine
 
     path, state = idle_run(run, trust, cluster)
@@ -240,7 +245,8 @@ def certify_command(
             f"{path}: its search has not finished; finish it first: ddenv resume {path}"
         )
     at_least = runs or settings(state).baseline_runs
-    engine = start_engine(path, jobs, certify=at_least, certify_rate=certify_rate, cluster=cluster)
+    job = Certify(at_least=at_least, certify_rate=certify_rate)
+    engine = start_engine(path, EngineOptions(jobs=jobs, cluster=cluster), job)
     return follow_to_summary(path, engine, as_json)[0]
 
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import signal
 import sys
@@ -13,13 +12,15 @@ import threading
 from contextlib import closing
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from ddenv import __version__
 from ddenv.engine.control import Control, DiskSpace, Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal
 from ddenv.engine.limits import check_crash_loop
-from ddenv.engine.margins import find_margins
+from ddenv.engine.margins import Stood, find_margins
 from ddenv.engine.notes import note_start
 from ddenv.engine.pool import Pool, Workers
 from ddenv.engine.scheduler import TestScheduler
@@ -28,7 +29,15 @@ from ddenv.errors import UserError
 from ddenv.runfile import events
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
-from ddenv.runs import processor
+from ddenv.runs.engine_job import (
+    Certify,
+    FindMargins,
+    GiveUpIsolation,
+    Isolate,
+    Job,
+    Order,
+    Reduce,
+)
 from ddenv.runs.experiment import read_parts
 from ddenv.runs.programs import ENGINE_SAYS, ENGINE_STARTED
 from ddenv.runs.trust import HERE, check_cluster, check_trusted, made_here
@@ -41,52 +50,15 @@ def main() -> int:
         prog="python -m ddenv.engine", description="Works on a run until it ends."
     )
     parser.add_argument("run", type=Path)
-    parser.add_argument("--jobs", type=int, default=processor.usable_cores())
-    parser.add_argument(
-        "--cluster", help="where the tests are made, in place of what the scenario says"
-    )
-    parser.add_argument("--accept-mode", choices=("automatic", "ask"))
-    parser.add_argument(
-        "--attended", choices=("yes", "no"), default="no", help="pause where there is an offer"
-    )
-    parser.add_argument(
-        "--bits", choices=("same", "mixed"), default="same", help="whether other bits may follow"
-    )
-    parser.add_argument(
-        "--anyway", choices=("yes", "no"), default="no", help="start after engines died at once"
-    )
-    parser.add_argument("--share", type=Path, help="folder of other runs; their tests are reused")
-    parser.add_argument(
-        "--certify",
-        type=int,
-        help="one more certificate, with at least so many runs of what is left",
-    )
-    parser.add_argument(
-        "--certify-rate",
-        type=float,
-        help="the last one goes on until it shows this part of the rate",
-    )
-    parser.add_argument(
-        "--isolate", type=int, help="find the nearest world that passes; fresh runs, 0: as usual"
-    )
-    parser.add_argument(
-        "--margins", help="find margins of the numbers of these globs, a JSON list; []: of all"
-    )
-    parser.add_argument("--most-runs", type=int, default=300, help="runs that margins may take")
-    parser.add_argument(
-        "--give-up", choices=("yes", "no"), default="no", help="end the isolation that is open"
-    )
-    parser.add_argument("--after", type=int, help="the last command before it was asked to start")
-    options = parser.parse_args()
+    parser.add_argument("order", help="what to do, and how: an `Order` of `ddenv.runs`, as JSON")
+    words = parser.parse_args()
     _say(ENGINE_STARTED)
     terminated = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: terminated.set())
     try:
-        with RunFile(options.run) as file, engine_lock(options.run):
-            if options.give_up == "yes":
-                return _give_up(file)
-            return _work(file, options, terminated)
+        with RunFile(words.run) as file, engine_lock(words.run):
+            return work(file, TypeAdapter(Order).validate_json(words.order), terminated)
     except UserError as error:
         _say(str(error))
         return 2
@@ -96,55 +68,24 @@ def _say(words: str) -> None:
     print(ENGINE_SAYS, words, file=sys.stderr, flush=True)
 
 
-def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Event) -> int:
-    jobs = max(1, options.jobs)
-    scenario, world, robot = read_parts(file)
-    cluster = options.cluster or scenario.reduction.cluster
+def work(file: RunFile, order: Order, terminated: threading.Event) -> int:
+    """Does a job in this process, and returns the exit code. Raises UserError."""
+    if isinstance(order.job, GiveUpIsolation):
+        return _give_up(file)
+    options = order.options
+    parts = read_parts(file)
+    scenario = parts[0]
     check_trusted(made_here(scenario) if options.cluster else scenario, file.path)
-    check_cluster(cluster)
-    after = file.last_command() if options.after is None else options.after
+    check_cluster(options.cluster or scenario.reduction.cluster)
     disk = DiskSpace(file, terminated)
     file.own(disk.wait)
     journal = Journal(file)
-    new = (
-        options.certify
-        or options.isolate is not None
-        or options.margins is not None
-        or journal.state.margining is not None
-        or journal.has_broken
-        or file.commands(journal.state.last_command)
-    )
-    if journal.state.status == "finished" and not new:
+    if journal.state.status == "finished" and not _has_work(file, journal, order.job):
         return 0
-    if options.anyway == "no":
+    if not options.ignore_crashes:
         check_crash_loop(journal)
-    stood = journal.state.status
-    before = journal.state.reason
     try:
-        _begin(journal, jobs if cluster == HERE else 0, options.accept_mode)
-        control = Control(journal, terminated, after, disk, attended=options.attended == "yes")
-        others = None if options.share is None else tests_of_others(file, scenario, options.share)
-        with closing(_workers(scenario, world, robot, jobs, cluster, journal)) as pool:
-            scheduler = TestScheduler(journal, pool, control, others)
-            if scenario.oracle is None:
-                scheduler.check_repeats(options.bits == "mixed")
-            note_start(scenario, world, robot, journal)
-            if options.certify:
-                Driver(scenario, world, journal, scheduler, control).certify(
-                    options.certify, options.certify_rate
-                )
-            elif options.isolate is not None or journal.state.isolating is not None:
-                isolate(world, journal, scheduler, options.isolate or None, before)
-            elif options.margins is not None or journal.state.margining is not None:
-                if options.margins is None:
-                    asked = None
-                else:
-                    asked = (json.loads(options.margins), options.most_runs)
-                find_margins(
-                    (scenario, world, robot), journal, pool, control, asked, (stood, before)
-                )
-            else:
-                Driver(scenario, world, journal, scheduler, control).reduce()
+        _carry_out(file, order, parts, journal, disk, terminated)
     except Stopped as stop:
         journal.lose_running()
         journal.record(events.EngineStopped(reason=str(stop)))
@@ -161,6 +102,53 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         file.set_live([])
         file.settle()
     return 0
+
+
+def _carry_out(
+    file: RunFile,
+    order: Order,
+    parts: tuple[Scenario, World, Model],
+    journal: Journal,
+    disk: DiskSpace,
+    terminated: threading.Event,
+) -> None:
+    """Raises Stopped, and UserError when it cannot go on."""
+    options = order.options
+    scenario, world, robot = parts
+    cluster = options.cluster or scenario.reduction.cluster
+    jobs = max(1, options.jobs)
+    stood = Stood(status=journal.state.status, reason=journal.state.reason)
+    _begin(journal, jobs if cluster == HERE else 0, options.accept_mode)
+    control = Control(journal, terminated, order.last_command, disk, attended=options.attended)
+    others = None
+    if options.shared_folder is not None:
+        others = tests_of_others(file, scenario, Path(options.shared_folder))
+    with closing(_workers(scenario, world, robot, jobs, cluster, journal)) as pool:
+        scheduler = TestScheduler(journal, pool, control, others)
+        if scenario.oracle is None:
+            scheduler.check_repeats(options.allow_other_machine)
+        note_start(scenario, world, robot, journal)
+        driver = Driver(scenario, world, journal, scheduler, control)
+        match order.job:
+            case Certify(at_least=at_least, certify_rate=certify_rate):
+                driver.certify(at_least, certify_rate)
+            case Isolate(at_least=at_least):
+                isolate(world, journal, scheduler, at_least, stood.reason)
+            case _ if journal.state.isolating is not None:
+                isolate(world, journal, scheduler, None, stood.reason)
+            case FindMargins() as asked:
+                find_margins(parts, journal, pool, control, asked, stood)
+            case _ if journal.state.margining is not None:
+                find_margins(parts, journal, pool, control, None, stood)
+            case _:
+                driver.reduce()
+
+
+def _has_work(file: RunFile, journal: Journal, job: Job) -> bool:
+    """Whether there is something to do in a run that has finished."""
+    if not isinstance(job, Reduce) or journal.state.margining is not None or journal.has_broken:
+        return True
+    return bool(file.commands(journal.state.last_command))
 
 
 def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:

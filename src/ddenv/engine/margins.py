@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
@@ -25,6 +25,7 @@ from ddenv.runfile import events
 from ddenv.runfile.progress import Margins
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.changes import beside
+from ddenv.runs.engine_job import FindMargins
 from ddenv.world.extent import center
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario, seed_of
@@ -66,33 +67,34 @@ def refusal(state: RunState, where: object) -> str:
     return "nothing is left, so there is no model with a margin"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Stood:
+    """How a run was before a search for margins: its status, and why."""
+
+    status: str
+    reason: str
+
+
 def find_margins(
     parts: Parts,
     journal: Journal,
     pool: Workers,
     control: Control,
-    asked: tuple[Sequence[str], int] | None,
-    stood: tuple[str, str],
+    asked: FindMargins | None,
+    stood: Stood,
 ) -> None:
-    """Finds the margins of the numbers `asked` for by their globs, with at most so many runs, or
-    goes on with the open search.
+    """Finds the margins that are `asked` for, or goes on with the open search.
 
-    The run is then as it `stood`: its status and why. Raises Stopped, and UserError.
+    The run is then as it `stood`. Raises Stopped, and UserError.
     """
     now = journal.state.margining
     if asked is not None:
-        numbers = numbers_left(parts, journal.state, asked[0])
-        budget = asked[1]
-        if now is None or (now.wanted, now.asked.budget) != (
-            tuple(one.name for one in numbers),
-            budget,
-        ):
-            _begin(
-                journal,
-                numbers,
-                budget,
-                stood if now is None else (now.asked.status, now.asked.before),
-            )
+        numbers = numbers_left(parts, journal.state, asked.globs)
+        wanted = tuple(one.name for one in numbers)
+        if now is not None:
+            stood = Stood(status=now.asked.status, reason=now.asked.before)
+        if now is None or (now.wanted, now.asked.budget) != (wanted, asked.most_runs):
+            _begin(journal, numbers, asked.most_runs, stood)
     _Search(parts, journal, pool, control).carry_out()
     margins = journal.state.margins
     if (
@@ -107,9 +109,7 @@ def find_margins(
     journal.record(events.MarginsFinished())
 
 
-def _begin(
-    journal: Journal, numbers: Sequence[Number], budget: int, stood: tuple[str, str]
-) -> None:
+def _begin(journal: Journal, numbers: Sequence[Number], budget: int, stood: Stood) -> None:
     certificate = current(journal.state)
     rate = journal.rate_of_whole()
     if certificate is not None:
@@ -119,7 +119,7 @@ def _begin(
     error = known.error_each(
         rate, min(budget, known.MOST_OF_NUMBER * (len(numbers) + (len(numbers) > 1)))
     )
-    status = "stopped" if stood[0] == "stopped" else "finished"
+    status = "stopped" if stood.status == "stopped" else "finished"
     environment = journal.number(journal.environment)
     certified = certificate is not None
     journal.record(
@@ -131,7 +131,7 @@ def _begin(
             budget=budget,
             certified=certified,
             status=status,
-            before=stood[1],
+            before=stood.reason,
         )
     )
 

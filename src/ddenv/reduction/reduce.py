@@ -281,11 +281,8 @@ def reduce(
             caller.iterations = FLAKY_ITERATIONS
     elif not caller.keep_rate:
         if check:
-            caller.carry_out(
-                steps.baseline(
-                    caller, caller.whole, baseline_runs if iterations else 1, bool(iterations)
-                )
-            )
+            runs = baseline_runs if iterations else 1
+            caller.carry_out(steps.baseline(caller, caller.whole, runs, keeps_rate=False))
         minimal = None if caller.search_once() else False
     if caller.keep_rate:
         caller.carry_out(steps.procedure(caller, caller.whole, baseline_runs, keeps_rate=True))

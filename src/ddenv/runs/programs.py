@@ -12,11 +12,12 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_is_alive, mode_beside
 from ddenv.runfile.store import RunFile
+from ddenv.runs.engine_job import EngineOptions, Job, Order, Reduce
 
 # Prefix of the engine's own lines in its log, where libraries print too; and its first line.
 ENGINE_SAYS = "ddenv engine:"
@@ -36,29 +37,18 @@ def log_of(run: Path) -> Path:
     return run.with_name(f"{run.name}.log")
 
 
-def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen[bytes]:
-    """Starts the engine on a run in its own session, so that it outlives this terminal.
+def start_engine(
+    run: Path, options: EngineOptions, job: Job | None = None
+) -> subprocess.Popen[bytes]:
+    """Starts the engine on a run in its own session, so that it outlives this terminal. Without a
+    `job` it reduces.
 
-    Its output goes to a log beside the run file. `options` that are not None become `--name=value`
-    on its command line. Raises UserError.
+    Its output goes to a log beside the run file. Raises UserError.
     """
     with RunFile(run) as file:
-        words = [
-            sys.executable,
-            "-m",
-            "ddenv.engine",
-            "--jobs",
-            str(jobs),
-            "--after",
-            str(file.last_command()),
-        ]
+        order = Order(job=job or Reduce(), options=options, last_command=file.last_command())
     # After `--`, a name that begins with a dash is no option.
-    given = {name: value for name, value in options.items() if value is not None}
-    words += [
-        *(f"--{name.replace('_', '-')}={value}" for name, value in given.items()),
-        "--",
-        str(run),
-    ]
+    words = [sys.executable, "-m", "ddenv.engine", "--", str(run), order.to_json()]
     try:
         log = _log(log_of(run), run)
     except OSError as error:

@@ -23,6 +23,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.engine_job import EngineOptions
 from ddenv.runs.experiment import load_parts
 from ddenv.runs.programs import STOP_WAIT, last_words, start_engine, stop_engines
 from ddenv.study.folder import Session, machine, opened, sessions, versions, write_sessions
@@ -56,9 +57,10 @@ class Work:
             create_run(cell.scenario, self.path)
         self.file = RunFile(self.path)
         self.before = self.state = fold(self.file.events())
-        self.engine = start_engine(
-            self.path, workers, accept_mode="automatic", share=self.path.parent
+        options = EngineOptions(
+            jobs=workers, accept_mode="automatic", shared_folder=str(self.path.parent)
         )
+        self.engine = start_engine(self.path, options)
 
     @property
     def tests(self) -> int:

@@ -29,7 +29,7 @@ from ddenv.guiding.commands import (
 from ddenv.guiding.key_offers import KeyOffer, Pointed, offer
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Trial
-from ddenv.runs import processor
+from ddenv.runs import engine_job, processor
 from ddenv.runs.tests_left import left_said
 from ddenv.text import count, first_of, plain, printable
 from ddenv.words.claims import drift, what_ran
@@ -251,7 +251,7 @@ class LineMode:
         elif isinstance(offered.command, StartEngine):
             self._start()
         elif isinstance(offered.command, Isolate):
-            self._start(isolate=0)
+            self._start(engine_job.Isolate())
         elif words := question(offered.command, self._poll.snapshot.state):
             self._asked = offered.command
             self._say(f"{words} Type yes to do it.")
@@ -269,10 +269,10 @@ class LineMode:
         if starts_engine(command, now.state) and now.engine == "absent":
             self._start()
 
-    def _start(self, **options: int) -> None:
+    def _start(self, job: engine_job.Job | None = None) -> None:
         state = self._poll.snapshot.state
         try:
-            self._engine.start(state.jobs or processor.usable_cores(), state.accept_mode, **options)
+            self._engine.start(state.jobs or processor.usable_cores(), state.accept_mode, job)
         except UserError as error:
             self._say(str(error))
         else:

@@ -6,6 +6,7 @@ from textual import events
 from textual.widgets import Input
 
 from ddenv.runfile.store import RunFile
+from ddenv.runs.engine_job import Reduce
 from tests.tiers import slow
 from tests.waiting import eventually
 from tests.workbench.setup.setup_session import Opened, write_scenario
@@ -20,7 +21,7 @@ async def test_the_baseline_pauses_after_itself(scenarios, runs, started):
         session.fill(jobs="3")
         await session.press("f6")
         assert session.wrong_or_run() == "crates-1"
-        assert started == [("crates-1.ddenv", 3, {"accept_mode": "automatic", "attended": "yes"})]
+        assert started == [("crates-1.ddenv", fake_run.attended(3), Reduce())]
         with RunFile(runs / "crates-1.ddenv") as run:
             assert [(command.kind, command.data) for command in run.commands()] == [
                 ("step", {"unit": "round"})

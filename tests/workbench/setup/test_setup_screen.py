@@ -7,6 +7,7 @@ import fake_run
 import pytest
 from textual.widgets import Button, Input, OptionList, Select, Static
 
+from ddenv.runs.engine_job import Reduce
 from ddenv.schemas import names
 from ddenv.words.methods import KINDS
 from ddenv.workbench.help.shortcuts import Help
@@ -35,7 +36,7 @@ async def test_start_writes_the_run_and_attaches_to_it(scenarios, runs, started)
         session.fill(iterations="5", seed="7", jobs="3", accept="ask")
         session.fill(**dict(zip(KINDS, ("splitting", "timeseg", "timestep"), strict=True)))
         await session.press("f5")
-        assert started == [("crates-1.ddenv", 3, {"accept_mode": "ask", "attended": "yes"})]
+        assert started == [("crates-1.ddenv", fake_run.attended(3, "ask"), Reduce())]
         assert isinstance(session.app.screen, RunScreen)
         assert (runs / "crates-1.ddenv").is_file()
         reduction = session.made().reduction

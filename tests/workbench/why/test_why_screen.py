@@ -13,6 +13,7 @@ from ddenv.cli.command_line import app as command_line
 from ddenv.evidence.certificate import IN_TURN, Pairs
 from ddenv.report.report import write_report
 from ddenv.runfile.store import RunFile
+from ddenv.runs import engine_job
 from ddenv.runs.reasons import nearest, parting_sentence, reasons, sentence
 from ddenv.text import percent
 from ddenv.workbench.help.footer import KeyFooter
@@ -201,13 +202,7 @@ async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, sta
         screen = await opened(session)
         assert "world that passes" in session.text(KeyFooter)
         await session.press("i")
-        assert started == [
-            (
-                run.path.name,
-                run.state.jobs,
-                {"accept_mode": "automatic", "attended": "yes", "isolate": 0},
-            )
-        ]
+        assert started == [(run.path.name, fake_run.attended(run.state.jobs), engine_job.Isolate())]
         # The engine begins.
         run.hold()
         run.start_isolation(2)

@@ -28,7 +28,7 @@ from ddenv.guiding.commands import (
     starts_engine,
 )
 from ddenv.runfile.snapshot import Snapshot
-from ddenv.runs import processor
+from ddenv.runs import engine_job, processor
 from ddenv.runs.folder import attach_name
 from ddenv.text import duration, plain
 from ddenv.workbench.shared.background import refuse
@@ -129,7 +129,7 @@ class CommandSender:
         elif isinstance(command, StartEngine):
             self._once_trusted(self._start)
         elif isinstance(command, Isolate):
-            self._once_trusted(lambda: self._start(isolate=0))
+            self._once_trusted(lambda: self._start(engine_job.Isolate()))
         elif not sure and (dropped := drops(command, now.state)):
             self._decide_first(command, dropped)
         elif sure or not (asked := question(command, now.state)):
@@ -232,9 +232,9 @@ class CommandSender:
                 lambda yes: then() if yes else self.refuse(UNTRUSTED),
             )
 
-    def _start(self, **options: int) -> None:
+    def _start(self, job: engine_job.Job | None = None) -> None:
         state = self._poll.snapshot.state
         try:
-            self._engine.start(state.jobs or processor.usable_cores(), state.accept_mode, **options)
+            self._engine.start(state.jobs or processor.usable_cores(), state.accept_mode, job)
         except UserError as error:
             self._screen.notify(str(error), severity="error", markup=False)

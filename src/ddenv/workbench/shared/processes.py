@@ -12,6 +12,7 @@ from threading import Thread
 from ddenv.errors import UserError
 from ddenv.runfile import reading
 from ddenv.runfile.tested import Wanted
+from ddenv.runs.engine_job import EngineOptions, Job, Reduce
 from ddenv.text import plain
 
 # Maximum time that the screen waits for a program to end, s.
@@ -29,14 +30,15 @@ class Engine:
         self._worked = False
         self._last_words = ""
 
-    def start(self, jobs: int, accept_mode: str, **options: int) -> None:
-        """`options` are those of `start_engine`. Raises UserError if it cannot be started."""
+    def start(self, jobs: int, accept_mode: str, job: Job | None = None) -> None:
+        """Starts it on a `job`, by default on the reduction. Raises UserError if it cannot be
+        started.
+        """
         from ddenv.runs.programs import start_engine
 
+        options = EngineOptions(jobs=max(1, jobs), accept_mode=accept_mode, attended=True)
         try:
-            self._process = start_engine(
-                self.run, max(1, jobs), accept_mode=accept_mode, attended="yes", **options
-            )
+            self._process = start_engine(self.run, options, job or Reduce())
         except OSError as error:
             raise UserError(f"{self.run}: the engine cannot be started: {error.strerror}") from None
         self._worked = False
