@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
 from ddenv.evidence.claims import current
-from ddenv.runfile.state import FIRST_FRESH_RUN
+from ddenv.run_numbers import CERTIFICATES
 from ddenv.runfile.store import RunFile
 from ddenv.words.claims import missing
 from tests.engine.fake import CHEAP, ELEMENTS, FakePool, drive, engine, new_run
@@ -76,8 +76,8 @@ def test_a_certificate_has_fresh_runs_of_what_is_left_and_without_each_model(tmp
     ]
     assert found[None].runs >= 10
     fresh = [test for test in state.tests if test.phase == "certify"]
-    assert all(test.run >= FIRST_FRESH_RUN for test in fresh)
-    assert all(test.run < FIRST_FRESH_RUN for test in state.tests if test.phase != "certify")
+    assert all(test.run >= CERTIFICATES.start for test in fresh)
+    assert all(test.run < CERTIFICATES.start for test in state.tests if test.phase != "certify")
     assert state.reason == (
         "no single model can be removed: f in 11 of 11 fresh runs (65 % to 100 %), at least 66 % "
         "of the whole world's rate; "
@@ -151,7 +151,9 @@ def test_a_model_that_certificates_show_as_needless_is_left_out(tmp_path):
     # Without the ball the seeds of the search miss f, fresh ones do not.
     def oracle(keep, seed):
         return (
-            "similar" if "wall" in keep and ("ball" in keep or seed >= FIRST_FRESH_RUN) else "pass"
+            "similar"
+            if "wall" in keep and ("ball" in keep or seed >= CERTIFICATES.start)
+            else "pass"
         )
 
     state = drive(kept(tmp_path), FakePool(oracle, 2))
@@ -224,7 +226,7 @@ def test_a_certificate_can_be_made_again_with_more_runs(tmp_path):
 
 def test_a_few_broken_fresh_runs_leave_a_finished_run_as_it_is(tmp_path):
     def oracle(keep, seed):
-        return "error" if seed == FIRST_FRESH_RUN + 3 else needs("wall")(keep, seed)
+        return "error" if seed == CERTIFICATES.start + 3 else needs("wall")(keep, seed)
 
     path = kept(tmp_path)
     assert drive(path, FakePool(oracle, 2)).minimal

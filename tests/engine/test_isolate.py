@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from ddenv.engine.__main__ import _give_up
 from ddenv.engine.control import Stopped
-from ddenv.engine.isolate import FEWEST_RUNS, FIRST_RUN, isolate
+from ddenv.engine.isolate import FEWEST_RUNS, isolate
 from ddenv.evidence.claims import is_nearest
+from ddenv.run_numbers import ISOLATIONS
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import ISOLATE
 from ddenv.runfile.store import RunFile
@@ -144,7 +145,7 @@ def test_killed_and_resumed_it_comes_to_the_same_end(after, jobs):
 def test_what_only_the_seeds_of_the_search_let_pass_is_refuted_by_fresh_runs(tmp_path):
     def oracle(keep, seed):
         if "wall" not in keep:
-            return "similar" if seed >= FIRST_RUN and "beam" in keep else "pass"
+            return "similar" if seed >= ISOLATIONS.start and "beam" in keep else "pass"
         return "similar" if "beam" in keep else "pass"
 
     path = reduced(tmp_path, needs("wall", "beam"))
@@ -288,7 +289,7 @@ def test_a_model_that_fresh_runs_show_may_stay_is_put_back(tmp_path):
     """With the wall back the seeds of the search miss the goal, fresh ones do not."""
 
     def oracle(keep, seed):
-        missed = "wall" in keep and seed < FIRST_RUN
+        missed = "wall" in keep and seed < ISOLATIONS.start
         return "similar" if "beam" in keep or missed else "pass"
 
     state = work(reduced(tmp_path, needs("beam")), FakePool(oracle, 2))

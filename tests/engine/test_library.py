@@ -16,7 +16,7 @@ import ddenv
 from ddenv.engine.judging import traits_of, trajectory_of
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import Terms
-from ddenv.reduction.reduce import EACH_CERTIFICATE
+from ddenv.run_numbers import CALLS_OF_CERTIFICATE
 from ddenv.schemas import names
 from ddenv.world.extent import center
 from ddenv.world.sdf.read import read_world
@@ -91,7 +91,7 @@ def test_the_library_and_the_engine_test_the_same_models_in_the_same_order(
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         # Without seeds runs are made in blocks, and claims may begin anew with later numbers.
         patch.setattr("ddenv.evidence.claims.Terms", partial(Terms, order_seed=0))
-        patch.setattr("ddenv.engine.journal.FRESH_RUNS", EACH_CERTIFICATE)
+        patch.setattr("ddenv.engine.journal.OF_CERTIFICATE", CALLS_OF_CERTIFICATE)
         path = new_run(
             Path(folder), algorithm=algorithm, pair=pair, accept_rate=accept, slice=False, **more
         )

@@ -14,8 +14,8 @@ import threading
 import pytest
 
 from ddenv.errors import UserError
+from ddenv.run_numbers import CERTIFICATES
 from ddenv.runfile.lock import engine_is_alive
-from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.engine_job import EngineOptions
@@ -131,7 +131,7 @@ def test_a_certificate_that_broke_is_made_again(lab, tmp_path):
     """
     plan, folder = plan_of(wall(tmp_path), **ONE), tmp_path / "study"
     lab.oracle = lambda name, keep, seed: (
-        "error" if seed >= FIRST_FRESH_RUN and "wall" not in keep else fails(name, keep, seed)
+        "error" if seed >= CERTIFICATES.start and "wall" not in keep else fails(name, keep, seed)
     )
     code, words = study(folder, plan)
     assert code == 1 and "0 of 1 cell certified" in words

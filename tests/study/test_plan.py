@@ -9,7 +9,7 @@ from ddenv.errors import UserError
 from ddenv.evidence.certificate import MOST_BROKEN, MOST_PAIRS
 from ddenv.reduction.procedure import MOST_STEPS_BACK
 from ddenv.reduction.verdict import LONGEST_BASELINE, MOST_RUNS
-from ddenv.runfile.state import FIRST_FRESH_RUN
+from ddenv.run_numbers import CERTIFICATES
 from ddenv.study.plan import PAIRS, make_plan, run_path
 from ddenv.study.results import paper_row
 from tests.study.made import LONGEST, crates, plan_of
@@ -93,9 +93,9 @@ def test_no_run_of_one_seed_is_a_run_of_another(tmp_path, baseline_runs, iterati
     )
     # The search, and all certificates that a run can make.
     one = max(baseline_runs, 1 + iterations, LONGEST_BASELINE, MOST_RUNS)
-    assert one < FIRST_FRESH_RUN
+    assert one < CERTIFICATES.start
     steps = 1 + MOST_STEPS_BACK
-    last = FIRST_FRESH_RUN + steps * (MOST_PAIRS + MOST_BROKEN + 1)
+    last = CERTIFICATES.start + steps * (MOST_PAIRS + MOST_BROKEN + 1)
     seeds = [cell.seed for cell in plan.cells]
     assert seeds[0] == 7
     assert all(after - before > last for before, after in pairwise(seeds))

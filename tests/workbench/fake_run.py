@@ -12,10 +12,11 @@ from pathlib import Path
 from ddenv import __version__
 from ddenv.evidence.certificate import Pairs
 from ddenv.evidence.rates import anytime_interval
+from ddenv.run_numbers import CERTIFICATES
 from ddenv.runfile.events import Created
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_lock
-from ddenv.runfile.state import FIRST_FRESH_RUN, RunState
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import ROBOT, Live, Motions, RunFile, create
 from ddenv.runs.engine_job import EngineOptions
 from ddenv.settings import PRINTED
@@ -107,7 +108,7 @@ class FakeRun:
         self.round = 0
         self.trials = 0
         self.certificates = 0
-        self.fresh = self.first_fresh = FIRST_FRESH_RUN
+        self.fresh = self.first_fresh = CERTIFICATES.start
         # What takes part in each run from now on.
         self.met: list[str] | None = None
         self._stack = ExitStack()

@@ -17,16 +17,14 @@ from ddenv.reduction.evidence import distances_to_failure
 from ddenv.reduction.isolation import MOST_CHECKS, Asked, Checked, Each, Passing, isolation
 from ddenv.reduction.procedure import NamedClaim
 from ddenv.reduction.round import Stacks
+from ddenv.run_numbers import ISOLATIONS, OF_CERTIFICATE
 from ddenv.runfile import events
 from ddenv.runfile.fold_decisions import exact_runs
 from ddenv.runfile.progress import Isolation
-from ddenv.runfile.state import FRESH_RUNS
 from ddenv.runfile.supports import stacks_of
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction
 
-# Far from all runs of certificates, of which each has some thousands.
-FIRST_RUN = 100_000_000
 # So many fresh runs of the world that passes, at least: their interval has to say something.
 FEWEST_RUNS = 20
 VERDICTS = {"similar": "passes", "dissimilar": "fails", "unknown": "unknown"}
@@ -90,11 +88,11 @@ def _begin(world: World, journal: Journal, at_least: int | None, before: str) ->
     )
     chosen = exact_runs(state) if journal.whole == state.environments[0] else ()
     number = len(state.isolations) + 1
-    first = FIRST_RUN if last is None else last.asked.run + MOST_CHECKS * last.asked.block
+    first = ISOLATIONS.start if last is None else last.asked.run + MOST_CHECKS * last.asked.block
     started = events.IsolationStarted(
         isolation=number,
         run=first,
-        block=max(FRESH_RUNS, 2 * least),
+        block=max(OF_CERTIFICATE, 2 * least),
         wanted=rule.wanted,
         rather_than=rule.rather_than,
         keep_rate=reduction.keep_rate,

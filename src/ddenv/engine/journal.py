@@ -14,14 +14,13 @@ from ddenv.evidence.certificate import NumberedRun
 from ddenv.evidence.rates import Shown, estimated_rate
 from ddenv.evidence.slices import Ties, implies
 from ddenv.reduction.procedure import Test as Wanted
+from ddenv.run_numbers import CERTIFICATES, OF_CERTIFICATE
 from ddenv.runfile.events import EnvironmentNamed, Event, TestLost
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
 from ddenv.runfile.state import (
     BROKEN,
     CERTIFY,
-    FIRST_FRESH_RUN,
-    FRESH_RUNS,
     ISOLATE,
     Round,
     RunState,
@@ -291,9 +290,9 @@ class Journal:
     def fresh_run(self) -> int:
         """The number of the first run of the next certificate, whose seed chose nothing so far."""
         if not self.state.certificates:
-            return FIRST_FRESH_RUN
+            return CERTIFICATES.start
         last = self.state.certificates[-1]
-        return last.first_run + max(FRESH_RUNS, 2 * last.at_least)
+        return last.first_run + max(OF_CERTIFICATE, 2 * last.at_least)
 
     @property
     def has_broken(self) -> bool:

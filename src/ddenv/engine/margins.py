@@ -21,6 +21,7 @@ from ddenv.evidence import margins as known
 from ddenv.evidence.claims import current
 from ddenv.evidence.rates import estimated_rate
 from ddenv.robot.oracle import ends_of
+from ddenv.run_numbers import FIXES
 from ddenv.runfile import events
 from ddenv.runfile.progress import Margins
 from ddenv.runfile.state import BROKEN, RunState
@@ -212,7 +213,7 @@ class _Search:
                 return
             self._looks = self._looks + 1
             self._possible = set()
-        runs = range(known.FIRST_FIX_RUN, known.FIRST_FIX_RUN + known.FIX_RUNS)
+        runs = range(FIXES.start, FIXES.start + known.FIX_RUNS)
         for fix in known.fixes_of(self._now)[: known.MOST_FIXES]:
             if fix.confirmed is None:
                 fresh = {
@@ -245,7 +246,7 @@ class _Search:
         seed = seed_of(self._parts[0].reduction, run)
         limit = wall_limit(self._journal.state)
         # Fresh runs are full ones, as those of a certificate.
-        if run >= known.FIRST_FIX_RUN or not self._journal.stops_early:
+        if run >= FIXES.start or not self._journal.stops_early:
             ends = None
         else:
             ends = ends_of(self._failures)

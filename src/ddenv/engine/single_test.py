@@ -20,6 +20,7 @@ from ddenv.evidence.claims import current
 from ddenv.evidence.rates import shows_at
 from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
+from ddenv.run_numbers import OTHER_SIMULATORS
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.state import Test as KnownTest
@@ -161,8 +162,6 @@ def run_trials(subject: Experiment, trials: list[Trial], jobs: int) -> Iterator[
         pool.close()
 
 
-# Far from all runs of a reduction, of its certificates and of isolations.
-FIRST_RUN = 1_000_000_000
 # After this number of broken runs nothing is said.
 MOST_BROKEN = 5
 
@@ -233,7 +232,7 @@ def reproduce(
     seeds = certificate.seeds[:most]
     rate = certificate.claims[0].low
     state = subject.state
-    trials = plan(subject, minimal=True, first_run=FIRST_RUN, repeat=most)
+    trials = plan(subject, minimal=True, first_run=OTHER_SIMULATORS.start, repeat=most)
     if seeds and state is not None:
         # The search has made these runs; how they compare with its records is said, too.
         known = {

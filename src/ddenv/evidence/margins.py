@@ -15,6 +15,7 @@ from itertools import count, takewhile
 from typing import Literal
 
 from ddenv.evidence.rates import leans_to
+from ddenv.run_numbers import FIXES
 from ddenv.runfile.events import NumberAsked
 from ddenv.runfile.progress import Margins
 from ddenv.runfile.state import BROKEN
@@ -38,11 +39,9 @@ MOST_OF_NUMBER = 120
 FIRST_LOOK = 32
 # Where f shows more rarely than this in what is left, no few runs say where it is gone.
 RAREST = 0.25
-# So many fresh runs judge each of so many fixes, from this run on: far from those of a reduction,
-# its certificates and isolations.
+# So many fresh runs judge each of so many fixes.
 FIX_RUNS = 20
 MOST_FIXES = 3
-FIRST_FIX_RUN = 500_000_000
 # Values are tried outward from the present one by growing steps: so many to the end of the range,
 # the first as a share of it.
 STEPS = 3
@@ -229,7 +228,7 @@ def known_of(margins: Margins, name: str) -> Known:
     """
     runs: dict[float, dict[int, tuple[str, str]]] = {}
     for one in margins.runs:
-        if one.name == name and one.run < FIRST_FIX_RUN:
+        if one.name == name and one.run < FIXES.start:
             runs.setdefault(one.value, {})[one.run] = one.outcome, one.failure
     finished = {
         value: [by[run] for run in takewhile(by.__contains__, count())]
@@ -272,7 +271,7 @@ def fixes_of(margins: Margins) -> tuple[Fix, ...]:
     """All values at which the robot reached its goal, the smallest change first."""
     fresh: dict[tuple[str, float], dict[int, bool]] = {}
     for run in margins.runs:
-        if run.run >= FIRST_FIX_RUN:
+        if run.run >= FIXES.start:
             fresh.setdefault((run.name, run.value), {})[run.run] = run.outcome == "pass"
     found = []
     tried = (

@@ -35,6 +35,7 @@ from ddenv.reduction.evidence import Evidence, Place, Traits, Trial
 from ddenv.reduction.guide import make_guide, search
 from ddenv.reduction.round import Partition, Round, Search
 from ddenv.reduction.verdict import Acceptance, standing
+from ddenv.run_numbers import CALLS_OF_CERTIFICATE
 from ddenv.settings import SETTINGS
 from ddenv.text import Names, count, percent, rounded
 
@@ -51,10 +52,6 @@ FLAKY_ITERATIONS = 3
 # This share of `most_tests` is for the last certificate alone, which has so many tests in any case.
 CERTIFICATE_SHARE = 0.25
 FEWEST_TESTS = 40
-# Runs of certificates are numbered from here on, so that they chose nothing; the search never comes
-# so far.
-FIRST_FRESH = 1_000_000
-EACH_CERTIFICATE = 1_000_000
 
 # Larger numbers are a mistake, and their squares could be infinite.
 LARGEST = 1e9
@@ -363,7 +360,7 @@ class _Caller:
         # missed f they are made.
         shown = list(self._of_whole)
         for number in range(1, self._certificates + 1):
-            first = FIRST_FRESH + number * EACH_CERTIFICATE
+            first = _first_fresh_call(number)
             tests = ((self.whole, run) for run in counted(first))
             shown += [self._known[test] for test in takewhile(self._known.__contains__, tests)]
         return estimated_rate(sum(shown), len(shown))
@@ -522,7 +519,7 @@ class _Caller:
             order_seed=self.seed,
             most_tests=max(self._affordable, FEWEST_TESTS),
         )
-        return steps.Certificate(FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
+        return steps.Certificate(_first_fresh_call(self._certificates), terms)
 
     def _warn_of_price(self) -> None:
         rate = self.rate()
@@ -665,3 +662,8 @@ def _time(value: Any) -> float | None:
     if isinstance(value, Real) and 0 <= cast(float, value) <= LARGEST:
         return float(value)
     return None
+
+
+def _first_fresh_call(certificate: int) -> int:
+    """The number of the first call that a certificate makes: it chose nothing before."""
+    return (1 + certificate) * CALLS_OF_CERTIFICATE

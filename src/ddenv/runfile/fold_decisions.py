@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ddenv.environment import Environment, Numbers
+from ddenv.run_numbers import CERTIFICATES
 from ddenv.runfile.fold_tests import (
     Changes,
     baseline_finished,
@@ -21,7 +22,7 @@ from ddenv.runfile.fold_tests import (
 )
 from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal, path
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import FIRST_FRESH_RUN, RunState, Test, Trial
+from ddenv.runfile.state import RunState, Test, Trial
 from ddenv.settings import SETTINGS, read
 from ddenv.text import Data, count, first_of, plain, truncated
 
@@ -320,7 +321,7 @@ def exact_runs(state: RunState) -> Numbers:
         return ()
     tests = (test for test in rested_on(state) if test.environment == whole and test.shows_f)
     return tuple(
-        sorted({test.run for test in tests if test.run < FIRST_FRESH_RUN})[: asked.exact_seeds]
+        sorted({test.run for test in tests if test.run < CERTIFICATES.start})[: asked.exact_seeds]
     )
 
 

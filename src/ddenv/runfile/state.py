@@ -110,10 +110,6 @@ _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
 # the models of a removal.
 CERTIFY = "certify"
 ISOLATE = "isolate"
-# The first run with a fresh seed; the search never comes so far. A certificate has so many seeds,
-# or more if it is asked for more.
-FIRST_FRESH_RUN = 10_000
-FRESH_RUNS = 1000
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from typing import Any
 
 from ddenv import schemas
 from ddenv.errors import UserError
-from ddenv.runfile.state import FIRST_FRESH_RUN
+from ddenv.run_numbers import CERTIFICATES
 from ddenv.runs.experiment import with_options
 from ddenv.runs.folder import SUFFIX
 from ddenv.text import Names
@@ -31,8 +31,8 @@ PAIRS = (
 # A seed is less.
 MOST_SEED = 2**31
 # Between the seeds of a scenario. Run i has seed + i: the search has few runs, certificates have
-# those from `FIRST_FRESH_RUN` on.
-SEEDS_APART = 10 * FIRST_FRESH_RUN
+# those from `CERTIFICATES` on.
+SEEDS_APART = 10 * CERTIFICATES.start
 # The folder of the runs, in that of the study.
 RUNS = "runs"
 # Characters that must not stand in the name of a file.

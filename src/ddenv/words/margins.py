@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 from ddenv.evidence.margins import (
     ERROR,
-    FIRST_FIX_RUN,
     FIX_RUNS,
     MOST_OF_NUMBER,
     Margin,
@@ -21,6 +20,7 @@ from ddenv.evidence.margins import (
     margins_of,
 )
 from ddenv.evidence.rates import anytime_interval
+from ddenv.run_numbers import FIXES
 from ddenv.runfile.failure_words import deed
 from ddenv.runfile.progress import Margins
 from ddenv.runfile.state import RunState
@@ -222,8 +222,8 @@ def finding(state: RunState) -> str:
     if not runs:
         return f"{FINDING}: at most {count(most, 'run')}"
     left = most - len(runs)
-    if runs[-1].run >= FIRST_FIX_RUN:
-        left = -sum(one.run >= FIRST_FIX_RUN for one in runs) % FIX_RUNS
+    if runs[-1].run >= FIXES.start:
+        left = -sum(one.run >= FIXES.start for one in runs) % FIX_RUNS
     seconds = sum(one.wall_seconds for one in runs) / len(runs) * left / max(1, state.jobs)
     done = f"{len(runs)} of at most {count(most, 'run')}"
     return f"{FINDING}: {runs[-1].name}, {done}, at most about {duration(seconds)} left"
@@ -233,7 +233,7 @@ def ran(_: RunState, after: RunState) -> str:
     """The line on a run: what it decides about its value; "" while that is open."""
     assert after.margins is not None
     last = after.margins.runs[-1]
-    if last.run >= FIRST_FIX_RUN:
+    if last.run >= FIXES.start:
         fixes = {(one.name, one.value): one for one in fixes_of(after.margins)}
         known = fixes.get((last.name, last.value))
         if known is None or known.confirmed is None:
