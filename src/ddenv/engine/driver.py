@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import cycle, islice
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.journal import Journal
@@ -141,7 +141,7 @@ class Driver:
         procedure = steps.procedure(
             self, whole, reduction.baseline_runs, keeps_rate, leg, enough_alike=alike
         )
-        if self._carry_out(procedure) is None:
+        if self._scheduler.carry_out(procedure) is None:
             self._end(False, str(self._baseline))
         else:
             self._conclude()
@@ -201,27 +201,11 @@ class Driver:
             self._journal.state.environments[node.id] for node in self._journal.state.path
         )
         try:
-            self._carry_out(steps.certify(self, leg, chain))
+            self._scheduler.carry_out(steps.certify(self, leg, chain))
         except steps.Changed:
             self.start_search()
             raise Stopped(CHANGED) from None
         self._conclude()
-
-    def _carry_out(self, work: steps.Work[Any]) -> Any:
-        """To the end; returns what the procedure returns. Whatever the user changes enters here, or
-        in what it asks.
-        """
-        changed: steps.Changed | None = None
-        while True:
-            try:
-                tests = next(work) if changed is None else work.throw(changed)
-            except StopIteration as end:
-                return end.value
-            changed = None
-            try:
-                self._scheduler.work(tests)
-            except steps.Changed as change:
-                changed = change
 
     def _first_leg(self) -> steps.Leg:
         """The leg of an engine that starts after the baseline, or at its end."""

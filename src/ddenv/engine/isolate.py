@@ -142,14 +142,7 @@ class _Isolator:
         `TestScheduler.work`, and Stopped.
         """
         work = isolation(self, self._asked, self._known_checks())
-        while True:
-            _open(self._journal)
-            try:
-                tests = next(work)
-            except StopIteration as end:
-                removed: Environment | None = end.value
-                return removed
-            self._scheduler.work(tests)
+        return self._scheduler.carry_out(work, before_tests=lambda: _open(self._journal))
 
     refusals = 0
 

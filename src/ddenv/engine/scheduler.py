@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from ddenv.engine.slicing import audit_is_due, compare
 from ddenv.engine.worker import Broken, Ended, Result, Run, Start
 from ddenv.environment import Environment
 from ddenv.errors import UserError
-from ddenv.reduction.procedure import Changed, Test
+from ddenv.reduction.procedure import Changed, Test, Work
 from ddenv.reduction.verdict import Acceptance, decided_by, standing
 from ddenv.robot.oracle import Failure, ends_of
 from ddenv.robot.result import RunResult
@@ -53,6 +53,10 @@ PATIENCE = 1.0
 # that break only some tests, others end.
 MOST_BROKEN = 25
 
+# What a procedure returns at its end.
+Found = TypeVar("Found")
+Look = Callable[[], object]
+
 
 class TestScheduler:
     """Makes tests with `pool`, as `control` allows, and records them in `journal`. `rule` judges
@@ -82,6 +86,27 @@ class TestScheduler:
         self._live_shown = False
         self._broken = 0
         self.rule = Acceptance(most_misses=1)
+
+    def carry_out(self, work: Work[Found], before_tests: Look = lambda: None) -> Found:
+        """Makes the tests of a procedure to its end, and returns what it returns; looks around with
+        `before_tests` each time.
+
+        Whatever the user changes enters the procedure as Changed, or in what it asks. Raises as
+        `work`, but for a Changed that the procedure takes.
+        """
+        changed: Changed | None = None
+        while True:
+            before_tests()
+            try:
+                tests = next(work) if changed is None else work.throw(changed)
+            except StopIteration as end:
+                found: Found = end.value
+                return found
+            changed = None
+            try:
+                self.work(tests)
+            except Changed as change:
+                changed = change
 
     def work(self, tests: Sequence[Test]) -> None:
         """Starts as many of the wanted tests as workers are free, and looks around once.
