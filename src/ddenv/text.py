@@ -145,12 +145,18 @@ def between(low: float, high: float) -> str:
 
 def about(middle: float, low: float = 0.0, high: float = 0.0) -> str:
     """An estimated time in s, with its interval if there is one: 2 min (1 to 5)."""
-    unit, name = (1.0, "s") if middle < 90 else (60.0, "min") if middle < 5400 else (3600.0, "h")
+    name = "s"
+    unit = 1.0
+    if middle >= 5400:
+        name = "h"
+        unit = 3600.0
+    elif middle >= 90:
+        name = "min"
+        unit = 60.0
+    words = f"{rounded(middle / unit):,} {name}"
     if rounded(low / unit) < rounded(high / unit):
-        interval = f" ({between(low / unit, high / unit)})"
-    else:
-        interval = ""
-    return f"{rounded(middle / unit):,} {name}{interval}"
+        return f"{words} ({between(low / unit, high / unit)})"
+    return words
 
 
 def coordinates(place: Sequence[float]) -> str:

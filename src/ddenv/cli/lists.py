@@ -172,8 +172,9 @@ def finding_lines(found: Iterable[Finding], columns: int | None) -> Iterator[str
             if finding.advice:
                 yield from wrapped(finding.advice, columns, f"  {'':<{width}}  → ")
     wrong, notes = (sum(finding.state == state for finding in found) for state in ("wrong", "note"))
-    yield (
-        f"✗ {wrong} wrong"
-        if wrong
-        else "all is well" + (f"; ! {notes} worth a look" if notes else "")
-    )
+    if wrong:
+        yield f"✗ {wrong} wrong"
+    elif notes:
+        yield f"all is well; ! {notes} worth a look"
+    else:
+        yield "all is well"

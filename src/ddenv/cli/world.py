@@ -370,7 +370,9 @@ def show(
         return 0
     world, _ = _read(file, reading)
     # As for 'ddenv run', the third number is the height.
-    start = None if spawn is None else (spawn[0], spawn[1], spawn[3] if len(spawn) > 3 else 0.0)
+    start = None
+    if spawn is not None:
+        start = (spawn[0], spawn[1], spawn[3] if len(spawn) > 3 else 0.0)
     if svg is not None:
         write_file(svg, svg_map(world, spawn=start, goal=goal).encode())
         say_written([svg])

@@ -432,8 +432,11 @@ def falls(
             and likeliest ** (HOPE * MOST_REMOVAL_PAIRS / (run + 1)) < 1.0 / error
         ):
             break
-    about_as_often = assumed.second + assumed.both > 0 and assumed.share >= ABOUT_AS_OFTEN
-    return ("rarer" if rarer else "not needed" if about_as_often else "not shown"), bound
+    if rarer:
+        return "rarer", bound
+    if assumed.second + assumed.both > 0 and assumed.share >= ABOUT_AS_OFTEN:
+        return "not needed", bound
+    return "not shown", bound
 
 
 def often(environment: Environment, runs: int) -> Procedure:

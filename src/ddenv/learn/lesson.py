@@ -125,7 +125,11 @@ def _spans(text: str) -> tuple[tuple[str, Style], ...]:
     begin = 0
     for found in _SPAN.finditer(text):
         spans.append((text[begin : found.start()], ""))
-        style: Style = "strong" if found[1] else "emphasis" if found[2] else "code"
+        style: Style = "code"
+        if found[1]:
+            style = "strong"
+        elif found[2]:
+            style = "emphasis"
         spans.append((found[1] or found[2] or found[3], style))
         begin = found.end()
     return tuple(span for span in (*spans, (text[begin:], "")) if span[0])

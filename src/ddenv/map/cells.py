@@ -141,9 +141,10 @@ def picture(
         label_cells(grid, centers).tolist(), letters, fills, strict=True
     ):
         if row >= 0 and sign:
-            canvas.put(
-                (row, column), sign, readable(fill) if color else PLAIN, fill if color else None
-            )
+            if color:
+                canvas.put((row, column), sign, readable(fill), fill)
+            else:
+                canvas.put((row, column), sign, PLAIN, None)
     return canvas
 
 

@@ -209,8 +209,10 @@ def _turn(each: Drawn) -> tuple[int, float, float]:
     """The sort key: floors, then models with shapes, then those without; heights in steps of 1
     cm.
     """
-    group = 0 if each.floor else 1 if each.outline.polygons else 2
-    return group, 0.0 if each.floor else round(each.top, 2), -each.outline.area
+    if each.floor:
+        return 0, 0.0, -each.outline.area
+    group = 1 if each.outline.polygons else 2
+    return group, round(each.top, 2), -each.outline.area
 
 
 def _color(model: Model) -> RGB:

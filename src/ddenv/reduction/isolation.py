@@ -16,6 +16,7 @@ from typing import Protocol
 
 from ddenv.environment import NOTHING, Environment, Numbers
 from ddenv.evidence.certificate import Claim, Procedure, Wanted, error_of, falls, often
+from ddenv.evidence.certificate import Verdict as ClaimVerdict
 from ddenv.evidence.rates import estimated_rate, leans_to
 from ddenv.reduction.algorithms import ddmin
 from ddenv.reduction.procedure import NamedClaim, Runs, Work, judge, settled
@@ -219,11 +220,12 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Wor
             # is needed.
             shown = {run: driver.shown(with_it, run, full=True) for run in rule.exact}
             known = tuple(run for run, one in shown.items() if one is not None)
-            missed = False in shown.values()
-            claim = Claim(
-                verdict="needed" if missed else "not needed" if known == rule.exact else "not shown"
-            )
-            named.append(NamedClaim(model, with_it, claim, known))
+            verdict: ClaimVerdict = "not shown"
+            if False in shown.values():
+                verdict = "needed"
+            elif known == rule.exact:
+                verdict = "not needed"
+            named.append(NamedClaim(model, with_it, Claim(verdict=verdict), known))
         return Checked(removed, tuple(named))
     certain = replace(rule, error=error)
 
@@ -289,7 +291,12 @@ def passes(world: Environment, rule: Passing, at_least: int) -> Procedure:
         # A run that broke counts against what is claimed.
         terms = rule.wanted, rule.rather_than, rule.error
         fails, passing = (leans_to(reached, runs - reached - less, *terms) for less in (broken, 0))
-        found = True if passing else False if fails is False else None
+        if passing:
+            found = True
+        elif fails is False:
+            found = False
     for run in range(runs, at_least if found else 0):
         yield Wanted(((world, run),), (world,))
-    return ("not shown" if found is None else "passes" if found else "fails"), None
+    if found is None:
+        return "not shown", None
+    return ("passes" if found else "fails"), None

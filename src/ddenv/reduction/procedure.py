@@ -445,10 +445,14 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Cert
         # The search has made these runs.
         for model, rest in rests.items():
             shown = [driver.shown(rest, run) for run in certificate.exact]
-            open_verdict: Verdict = (
-                "unknown" if "broken" in shown else "not shown" if None in shown else "needed"
-            )
-            claim = Claim(verdict="not needed" if True in shown else open_verdict)
+            verdict: Verdict = "needed"
+            if True in shown:
+                verdict = "not needed"
+            elif "broken" in shown:
+                verdict = "unknown"
+            elif None in shown:
+                verdict = "not shown"
+            claim = Claim(verdict=verdict)
             made = (*made, NamedClaim(model, rest, claim, certificate.exact))
     certified = Certified(certificate, made)
     driver.certified(certified)

@@ -83,11 +83,9 @@ def _verdict(state: RunState) -> str:
         return f"None of the {count(whole, 'model')} is needed to make the robot fail"
     if left == whole:
         return f"The robot fails with all {count(left, 'model')}; none has been removed yet"
-    enough = (
-        f"{'is' if left == 1 else 'are'} enough to make the robot "
-        f"fail{'' if state.certified else ' so far'}"
-    )
-    return f"{left} of {whole} models {enough}"
+    verb = "is" if left == 1 else "are"
+    so_far = "" if state.certified else " so far"
+    return f"{left} of {whole} models {verb} enough to make the robot fail{so_far}"
 
 
 def _standing(record: Record) -> Paragraph:
@@ -145,12 +143,11 @@ def _figures(record: Record) -> tuple[tuple[str, str], ...]:
     if state.baseline is not None and (shown := rate_of_left(state))[0]:
         figures.append(shown)
     rounds = len(record.rounds)
-    return (
-        *figures,
-        (thousands(state.tests_done), "test" if state.tests_done == 1 else "tests"),
-        *(((thousands(rounds), "round" if rounds == 1 else "rounds"),) if rounds else ()),
-        (duration(spent(state, state.updated_at)), "computing time"),
-    )
+    figures.append((thousands(state.tests_done), "test" if state.tests_done == 1 else "tests"))
+    if rounds:
+        figures.append((thousands(rounds), "round" if rounds == 1 else "rounds"))
+    figures.append((duration(spent(state, state.updated_at)), "computing time"))
+    return tuple(figures)
 
 
 def files_of(file: Path) -> list[Path]:

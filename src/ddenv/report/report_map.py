@@ -155,7 +155,9 @@ def _sort(record: Record, name: str) -> str:
 
 def _model(each: Drawn, sort: str, frame: Frame, coarse: bool) -> str:
     parts = 1 if coarse else len(each.outline.polygons)
-    kind = " floor" if each.floor else "" if each.outline.polygons else " bare"
+    kind = "" if each.outline.polygons else " bare"
+    if each.floor:
+        kind = " floor"
     many = " many" if parts > 8 else ""
     title = f"<title>{written(each.model.name)} ({WORDS[sort]})</title>"
     return f'<path class="{sort}{kind}{many}" d="{path_of(each, frame, coarse)}">{title}</path>'

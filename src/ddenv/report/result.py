@@ -58,9 +58,7 @@ def _models(record: Record) -> list[Block]:
         "model": [
             (Name(name), " (pinned)") if name in state.pinned else Name(name) for name in names
         ],
-        "kind": [
-            "" if each is None else "static" if each.model.static else "dynamic" for each in drawn
-        ],
+        "kind": ["" if each is None else _kind(each) for each in drawn],
         "centre x, y, z, m": ["" if each is None else coordinates(each.center) for each in drawn],
         "size x × y × z, m": ["" if each is None else _size(each) for each in drawn],
     }
@@ -83,6 +81,10 @@ def _models(record: Record) -> list[Block]:
     if more:
         return [table, say(f"And {count(more, 'more model')}.")]
     return [table]
+
+
+def _kind(each: Drawn) -> str:
+    return "static" if each.model.static else "dynamic"
 
 
 def _size(each: Drawn) -> str:

@@ -80,7 +80,8 @@ def bar(part: float, aim: float) -> str:
     """A share as a bar of 20 cells, with a mark where it has to come."""
     filled = round(part * 20)
     mark = min(19, round(aim * 20))
-    return "".join("┃" if cell == mark else "█" if cell < filled else "░" for cell in range(20))
+    cells = f"{'█' * filled:░<20}"
+    return f"{cells[:mark]}┃{cells[mark + 1 :]}"
 
 
 def signs(counts: Mapping[str, int]) -> str:

@@ -76,7 +76,12 @@ def groups(screen: Screen[Any]) -> list[Group]:
     everywhere: list[ActiveBinding] = []
     for active in filter(_words, screen.active_bindings.values()):
         of_app = isinstance(active.node, App) or (active.node is screen and not active.binding.id)
-        (everywhere if of_app else own if active.node is screen else panes).append(active)
+        if of_app:
+            everywhere.append(active)
+        elif active.node is screen:
+            own.append(active)
+        else:
+            panes.append(active)
     pane = screen.focused
     title = "Here"
     hints = ""

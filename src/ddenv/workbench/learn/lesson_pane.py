@@ -148,9 +148,9 @@ def _hung(text: Text, indent: int, room: int) -> Text:
 
 def plain_words(words: str) -> str:
     """Without control characters; a space at an end stays."""
-    lead = words[:1] == " "
-    tail = words[-1:] == " "
-    return f"{' ' if lead else ''}{plain(words)}{' ' if tail and words.strip() else ''}"
+    lead = " " if words[:1] == " " else ""
+    tail = " " if words[-1:] == " " and words.strip() else ""
+    return f"{lead}{plain(words)}{tail}"
 
 
 def _question(question: Question, page: Page, room: int, cursor: int | None) -> Text:
@@ -158,8 +158,14 @@ def _question(question: Question, page: Page, room: int, cursor: int | None) -> 
     for place, answer in enumerate(question.answers):
         mark, style = ("▸", "reverse") if place == cursor else (" ", "")
         if page.chosen is not None:
-            mark = "✓" if answer.right else "✗" if place == page.chosen else " "
-            style = "bold" if answer.right or place == page.chosen else "dim"
+            mark = " "
+            style = "dim"
+            if answer.right:
+                mark = "✓"
+                style = "bold"
+            elif place == page.chosen:
+                mark = "✗"
+                style = "bold"
         line = _hung(Text(f" {mark} {LETTERS[place]}  {plain(answer.text)}", style), ANSWER, room)
         if page.chosen is None:
             line.apply_meta({"@click": f"screen.answer({place})"})

@@ -71,10 +71,9 @@ class RacerPane(Vertical):
         done = race.is_done(play)
         stopped = done and not play.ended
         ended = done and play.ended
-        figures = (
-            f" · {count(tests, 'test')}{', stopped' if stopped else ''} · {len(left)} "
-            f"left{' ✓' if ended else ''}"
-        )
+        has_stopped = ", stopped" if stopped else ""
+        sign = " ✓" if ended else ""
+        figures = f" · {count(tests, 'test')}{has_stopped} · {len(left)} left{sign}"
         # As text: a name may look like markup.
         self.border_title = Text(
             shortened(plain(play.name), max(6, room - 4 - len(figures))) + figures
@@ -100,9 +99,8 @@ def _bar(models: Names, left: frozenset[str], there: frozenset[str], room: int) 
     shares.
     """
     if len(models) <= room:
-        return "".join(
-            GONE if name not in left else IN if name in there else OUT for name in models
-        )
+        signs = dict.fromkeys(left, OUT) | dict.fromkeys(left & there, IN)
+        return "".join(signs.get(name, GONE) for name in models)
     kept = max(bool(left), round(room * len(left) / len(models)))
     tested = min(kept, max(bool(there & left), round(room * len(there & left) / len(models))))
     return IN * tested + OUT * (kept - tested) + GONE * (room - kept)

@@ -253,7 +253,8 @@ def _side_by_side(lines: list[Line], room: int) -> Text:
     width = max(len(line.name) for line in lines)
     text = Text(f"{'':<{width}}  tests  left\n", "dim")
     for line in lines:
-        left = "" if line.left is None else f"{len(line.left):>6}{' ✗' if line.can_go else '  '}"
+        sign = " ✗" if line.can_go else "  "
+        left = "" if line.left is None else f"{len(line.left):>6}{sign}"
         row = f"{plain(line.name):<{width}} {line.tests:>6}{left}"
         names = truncated(", ".join(map(plain, line.left or ())), max(0, room - len(row) - 1))
         row += f" {names}" if len(names) > 8 else ""

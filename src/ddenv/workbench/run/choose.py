@@ -114,10 +114,11 @@ class ChooseModels(ModalScreen[Names | None]):
         self.query_one("#found", Static).update(Text("   ".join(words)))
 
     def _prompt(self, name: str) -> Text:
-        mark = ("[x] " if name in self._chosen else "[ ] ") if self._several else ""
-        return Text(
-            f"{mark}{'+ ' if name in self._pinned else ''}{shortened(name, WIDTH)}", no_wrap=True
-        )
+        mark = ""
+        if self._several:
+            mark = "[x] " if name in self._chosen else "[ ] "
+        pin = "+ " if name in self._pinned else ""
+        return Text(f"{mark}{pin}{shortened(name, WIDTH)}", no_wrap=True)
 
     def action_move(self, by: int) -> None:
         self._filter()

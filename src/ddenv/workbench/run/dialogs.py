@@ -163,7 +163,9 @@ def rounds(chapters: Sequence[Chapter], at: int | None) -> Pick:
 
     lines = []
     for one in chapters:
-        left = f"{'○' if one.left == one.models else '●'} {one.left}" if one.kind == "round" else ""
+        left = ""
+        if one.kind == "round":
+            left = f"{'○' if one.left == one.models else '●'} {one.left}"
         name = "baseline" if one.kind == "baseline" else f"{one.kind} {one.number}"
         lines.append(line(name, str(one.models), left, count(one.tests, "test")))
     start = next(

@@ -285,8 +285,10 @@ def of_row(
     """
     if isinstance(item, FreshRuns):
         own = _fresh(state, item.node, item.without)
+    elif isinstance(item, Test):
+        own = [item]
     else:
-        own = [item] if isinstance(item, Test) else state.tests_of(item.tests if item else ())
+        own = state.tests_of(item.tests if item else ())
     tests = [test for test in own if test.is_finished or not finished]
     if isinstance(item, FreshRuns) and item.without is not None:
         left = {test.run: test for test in _fresh(state, item.node, None) if test.shows_f}

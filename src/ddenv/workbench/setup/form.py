@@ -99,7 +99,7 @@ def value(one: Setting, text: str) -> Value:
             wanted = f"press {'s for the start' if one in SPAWN else 'g for the goal'}, on the map"
         raise FieldError({one.name: f"missing; {wanted}"})
     try:
-        found = str(text) if one.kind is str else int(text) if one.kind is int else float(text)
+        found: Value = one.kind(text)
     except ValueError:
         wanted = "a whole number" if one.kind is int else "a number"
         raise FieldError({one.name: f"expected {wanted}, found '{text[:40]}'"}) from None

@@ -174,7 +174,9 @@ class WhyScreen(Screen[None]):
         # What the key of isolation does.
         begun = state.isolating is not None
         known = state.isolated is not None
-        does = (STOP if works else GO_ON) if begun else "" if known else BEGIN
+        does = "" if known else BEGIN
+        if begun:
+            does = STOP if works else GO_ON
         self.query_one(KeyFooter).say("why.isolate", does)
         if trouble and trouble != self._trouble:
             self.notify(plain(trouble), severity="error", markup=False)
