@@ -21,10 +21,11 @@ from click.shell_completion import CompletionItem
 
 from ddenv import __version__
 from ddenv.cli.options import fetch_option, given_reading, reading_options, runs_and_scenarios
-from ddenv.cli.terminal import CANNOT_SAY, announce
+from ddenv.cli.terminal import CANNOT_SAY, announce, show_progress
 from ddenv.errors import UserError
 from ddenv.runs.folder import named
 from ddenv.schemas import nearest
+from ddenv.world.files.watch import WATCH
 
 # The commands, and the file of each. Only that of the command that is used is loaded: the workbench
 # is on the screen sooner.
@@ -121,6 +122,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    WATCH.set(show_progress)
     answers = sys.argv[1:2] == ["reproduce"]
     try:
         code = app(standalone_mode=False, prog_name="ddenv")

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TextIO
 
 from ddenv.cli.summary import summary, summary_lines
-from ddenv.cli.terminal import announce, say, wrapped
+from ddenv.cli.terminal import CLEAR, announce, say, wrapped
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold, steps
 from ddenv.runfile.state import RunState
@@ -25,8 +25,6 @@ from ddenv.text import printable
 from ddenv.words.news import headline, news
 
 POLL = 0.2
-# Takes back the line of a terminal.
-CLEAR = "\r\x1b[K"
 
 
 @dataclass(eq=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 from collections.abc import Callable, Iterable
+from functools import lru_cache
 from typing import TextIO
 
 import click
@@ -13,6 +14,8 @@ from ddenv.text import printable, width
 
 # How `git bisect run` reads an exit code.
 CANNOT_SAY = 125
+# Takes back the line of a terminal.
+CLEAR = "\r\x1b[K"
 # The minimum width for readable text, columns.
 LEAST = 8
 
@@ -62,6 +65,17 @@ def announce(line: str) -> None:
         file=sys.stderr,
         flush=True,
     )
+
+
+@lru_cache(maxsize=1)
+def show_progress(words: str) -> None:
+    """Says on stderr how far a slow step is, once in the same words: on a terminal in one line,
+    which "" takes back.
+    """
+    if sys.stderr.isatty():
+        print(f"{CLEAR}{words}", end="", file=sys.stderr, flush=True)
+    elif words:
+        announce(words)
 
 
 def asking(trust: bool) -> Callable[[str], bool]:

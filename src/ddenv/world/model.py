@@ -249,6 +249,10 @@ def jointed_links(model: Model) -> dict[str, Link]:
     return {f"{model.name}::{link.name}": link for link in model.links}
 
 
+# Why a mesh that should be cut into pieces collides as its hull.
+UNCUT = "cutting it into pieces crashed or took too long"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Note:
     """A part of the file that was replaced or ignored (`kind`).

@@ -7,7 +7,10 @@ from ddenv.runs.preferences import state_file
 from ddenv.runs.remedies import REMEDIES, remembered
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup.files import KEPT, RECENT, FileList, OpenFile, recent_files, remember
+from ddenv.world.files import cutting
+from tests.waiting import eventually
 from tests.workbench.setup.setup_session import Opened, write_scenario
+from tests.world.files.cutters import PYRAMID, Cutters, write_world
 
 
 @pytest.mark.screens
@@ -82,6 +85,32 @@ async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, st
         await session.pilot.pause()
         await session.settle()
         assert [session.value(id) for id in (*fields, "jobs")] == ["12", "0.25", "9", "5", "4", "2"]
+
+
+@pytest.mark.screens
+async def test_meshes_that_are_cut_are_counted_and_another_choice_stops_that(
+    scenarios, tmp_path, home, monkeypatch
+):
+    processes = Cutters(tmp_path, "hangs")
+    monkeypatch.setattr(cutting, "COMMAND", processes.command)
+    monkeypatch.setattr(cutting, "SLOW", 0.0)
+    world = write_world(tmp_path, ("roof", PYRAMID))
+    async with Opened() as session:
+        session.screen.preview.read(world, opened=False)
+        await eventually(
+            lambda: (
+                "cutting meshes into convex pieces: 0 of 1"
+                in str(session.screen.preview.border_subtitle)
+            )
+        )
+        await eventually(processes.started)
+        await session.open(scenarios / "crates.sdf")
+        await eventually(lambda: not processes.left())
+        assert "12 models" in session.screen.query_one("#about", Static).render().plain
+        session.screen.preview.read(world, opened=False)
+        await eventually(lambda: processes.started() == 2)
+    # Nor does it go on once the workbench is left.
+    await eventually(lambda: not processes.left())
 
 
 @pytest.mark.screens

@@ -10,8 +10,11 @@ from hypothesis import strategies as st
 from manifold3d import Manifold
 
 from ddenv.world.files.boxes import box_of, volume
-from ddenv.world.files.pieces import MOST_PLATES, PLATE, build_pieces, convex_pieces
-from ddenv.world.files.triangles import Part
+from ddenv.world.files.kept_pieces import KNOWN, keep
+from ddenv.world.files.meshes import pack_pieces
+from ddenv.world.files.pieces import MOST_PLATES, PLATE, convex_pieces
+from ddenv.world.files.resources import MeshPart, Resources
+from ddenv.world.files.roots import search_roots
 from ddenv.world.model import Mesh
 from tests.tiers import examples
 
@@ -192,17 +195,29 @@ def test_any_triangles_at_all_become_pieces_within_their_hull(vertices, faces):
         assert (piece.vertices >= low - slack).all() and (piece.vertices <= high + slack).all()
 
 
-def test_pieces_are_cut_once_and_what_is_damaged_is_cut_again(tmp_path, monkeypatch):
-    monkeypatch.setenv("DDENV_HOME", str(tmp_path))
+def test_pieces_are_cut_once_and_what_is_damaged_is_cut_again(tmp_path, home, monkeypatch):
     cuts = []
-    monkeypatch.setattr(
-        "ddenv.world.files.pieces.convex_pieces",
-        lambda *given: cuts.append(1) or convex_pieces(*given),
-    )
-    parts = [Part("", *surface(house(4.0, 3.0, 0.9)))]
+
+    def cut_here(meshes):
+        cuts.extend(meshes)
+        for file, mesh in meshes.items():
+            keep(file, pack_pieces(convex_pieces(*mesh)))
+
+    monkeypatch.setattr("ddenv.world.files.cutting.cut", cut_here)
+    vertices, faces = surface(house(4.0, 3.0, 0.9))
+    trimesh.Trimesh(vertices, faces, process=False).export(tmp_path / "house.obj")
+    part = MeshPart("house.obj", tmp_path)
 
     def build(most=64, scale=(1.0, 1.0, 1.0)):
-        return build_pieces(parts, "", False, scale, most)
+        # As another program does.
+        KNOWN.clear()
+        disk = Resources({}, search_roots((), tmp_path))
+        disk.pieces(part, scale, most)
+        disk.cut()
+        return [
+            (piece.vertices.tolist(), piece.faces.tolist())
+            for piece in disk.pieces(part, scale, most)
+        ]
 
     first = build()
     assert build() == first and len(cuts) == 1

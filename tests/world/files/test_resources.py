@@ -36,7 +36,10 @@ def test_stored_gives_the_same_without_the_files(world):
     ]
     parts = [MeshPart("cube.obj", world, way["submesh"], way["center"]) for way in ways]
     given = [disk.mesh(part, convex=way["convex"]) for part, way in zip(parts, ways, strict=True)]
+    disk.pieces(parts[0], (1.0, 1.0, 1.0), 8)
+    disk.cut()
     pieces = disk.pieces(parts[0], (1.0, 1.0, 1.0), 8)
+    assert len(pieces) == 1
     text = disk.sdf("model://box", world)
     assert text == (world / "box" / "box.sdf", b"<sdf version='1.6'/>")
     assert disk.sdf("box/box.sdf", world)[1] == text[1]
@@ -94,10 +97,13 @@ def test_damaged_bytes(world):
 )
 def test_damaged_pieces(world, bad):
     disk = Resources({}, search_roots((), world))
-    disk.pieces(MeshPart("cube.obj", world), (1.0, 1.0, 1.0), 8)
+    cube = MeshPart("cube.obj", world)
+    disk.pieces(cube, (1.0, 1.0, 1.0), 8)
+    disk.cut()
+    disk.pieces(cube, (1.0, 1.0, 1.0), 8)
     stored = Resources(dict.fromkeys(disk.taken, bad))
     with pytest.raises(Unusable, match="damaged"):
-        stored.pieces(MeshPart("cube.obj", world), (1.0, 1.0, 1.0), 8)
+        stored.pieces(cube, (1.0, 1.0, 1.0), 8)
 
 
 def test_files_of_one_name_are_told_apart_by_content(world):

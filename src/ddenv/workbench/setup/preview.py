@@ -18,7 +18,7 @@ from textual.app import ComposeResult
 from textual.containers import Vertical
 from textual.message import Message
 from textual.widgets import Static
-from textual.worker import get_current_worker
+from textual.worker import Worker, get_current_worker
 
 from ddenv.errors import UserError
 from ddenv.runs.folder import free_run_path, runs_folder
@@ -35,6 +35,7 @@ from ddenv.workbench.setup.missing_files import MissingList
 from ddenv.workbench.setup.start_run import Past, past_of
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.bindings import keys
+from ddenv.world.files.watch import watched
 from ddenv.world.pose import Point
 
 # What to do about each kind of note; it comes first, since the end of a line may not fit.
@@ -150,7 +151,8 @@ class Preview(Vertical):
                 call_if_open(self, callback, *words)
 
         try:
-            choice = read_choice(path, self._reading)
+            with watched(partial(self._watch, worker)):
+                choice = read_choice(path, self._reading)
             place = place_of(choice.world, None if choice.bare else choice.settings)
         except UserError as error:
             tell(self._fail, str(error))
@@ -162,6 +164,16 @@ class Preview(Vertical):
         if opened and not worker.is_cancelled:
             remember(path)
         tell(self._show_past, past_of(choice.settings, runs_folder()))
+
+    def _watch(self, worker: Worker[None], words: str) -> None:
+        """Says how far the cutting of meshes is; where the user looks at something else by now, it
+        stops.
+        """
+        if worker.is_cancelled:
+            raise UserError("stopped")
+        if words:
+            # Waits for no answer: the app may just be ending.
+            self.call_later(setattr, self, "border_subtitle", words)
 
     def _fail(self, why: str) -> None:
         self.awaited = False
@@ -371,7 +383,7 @@ class Preview(Vertical):
         free = None
         found = tuple(note_inside(choice.world))
         # Start then reports the error of a robot's file.
-        with suppress(UserError):
+        with suppress(UserError), watched(partial(self._watch, worker)):
             if spawn is not None and (robot := choice.robot):
                 start = Spawn(x=spawn[0], y=spawn[1], z=spawn[2], yaw=spawn[3])
                 if goal:

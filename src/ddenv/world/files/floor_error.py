@@ -17,7 +17,7 @@ from ddenv.arrays import Floats
 from ddenv.text import first_of
 from ddenv.world.extent import vertices_of
 from ddenv.world.files.pieces import connected_parts, solid_of, union
-from ddenv.world.model import Collision, Mesh, Model, Piece, World
+from ddenv.world.model import UNCUT, Collision, Mesh, Model, Piece, World
 from ddenv.world.pose import Pose
 
 # Between these heights above z = 0 most robots touch what is there, m.
@@ -84,7 +84,11 @@ def _error(model: str, pieces: list[tuple[Piece, Collision]]) -> FloorError:
 
 def note_pieces(world: World, among: Collection[str]) -> Iterator[tuple[str, str]]:
     """Which `among` these models block the floor clearly otherwise than their meshes do."""
-    wrong = []
+    wrong = [
+        f"{note.model} (its hull: {UNCUT})"
+        for note in world.notes
+        if UNCUT in note.why and note.model in among
+    ]
     for error in floor_errors(model for model in world.models if model.name in among):
         most = max(error.blocked, error.free)
         if most > LARGE and most * error.floor > LARGE_AREA:

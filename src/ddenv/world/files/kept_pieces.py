@@ -20,6 +20,11 @@ from ddenv.world.files.meshes import unpack_pieces
 
 # Another number makes the pieces of earlier versions of this program unknown.
 RULES = 1
+# What this program cut. No file has the meshes that could not be cut: they have no pieces until
+# another program tries them.
+KNOWN: dict[Path, bytes] = {}
+# Vertices (N, 3) m, faces (M, 3), and the maximum number of pieces.
+ToCut = tuple[Floats, Integers, int]
 
 
 def kept_file(vertices: Floats, faces: Integers, most: int) -> Path:
@@ -39,7 +44,9 @@ def kept_file(vertices: Floats, faces: Integers, most: int) -> Path:
 
 
 def read_kept(file: Path) -> bytes | None:
-    """The packed pieces in `file`; None if there are none."""
+    """The packed pieces that are kept as `file`; None if that is not known."""
+    if file in KNOWN:
+        return KNOWN[file]
     try:
         packed = file.read_bytes()
         unpack_pieces("", packed)
@@ -49,7 +56,8 @@ def read_kept(file: Path) -> bytes | None:
 
 
 def keep(file: Path, packed: bytes) -> None:
-    """Writes packed pieces to `file`, if it can be written."""
+    """Keeps packed pieces as `file`; if that cannot be written, only in this program."""
+    KNOWN[file] = packed
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         write_file(file, packed)

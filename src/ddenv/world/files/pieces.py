@@ -20,13 +20,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import breadth_first_order
 
 from ddenv.arrays import Booleans, Floats, Integers
-from ddenv.world.access import Unusable
 from ddenv.world.files.boxes import volume
-from ddenv.world.files.kept_pieces import keep, kept_file, read_kept
-from ddenv.world.files.meshes import Surface, convex_hull, pack_pieces, surface_of
-from ddenv.world.files.triangles import Part
+from ddenv.world.files.meshes import Surface, convex_hull
 from ddenv.world.model import Mesh
-from ddenv.world.pose import Vector
 
 # A piece that leaves at most this share of its hull empty is that hull.
 EMPTY = 0.002
@@ -56,24 +52,6 @@ SIMPLER = 0.01
 MOST_WORK = 10_000_000
 # A plane's unit normal (3,), and its distance from the origin along that, m.
 Plane = tuple[Floats, float]
-
-
-def build_pieces(parts: list[Part], submesh: str, center: bool, scale: Vector, most: int) -> bytes:
-    """The convex pieces, at most `most`, of what `build` takes from these arguments, times `scale`;
-    packed. Raises Unusable.
-    """
-    vertices, faces = surface_of(parts, submesh, center)
-    vertices = vertices * np.array(scale)
-    kept = kept_file(vertices, faces, most)
-    packed = read_kept(kept)
-    if packed is not None:
-        return packed
-    try:
-        packed = pack_pieces(convex_pieces(vertices, faces.astype(np.int64), most))
-    except ValueError as error:
-        raise Unusable(str(error)) from None
-    keep(kept, packed)
-    return packed
 
 
 def convex_pieces(vertices: Floats, faces: Integers, most: int) -> list[Surface]:

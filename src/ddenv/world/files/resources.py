@@ -42,6 +42,7 @@ from ddenv.world.files.fuel import (
     refuse_link_out,
 )
 from ddenv.world.files.heights import read_heights, unpack_heights
+from ddenv.world.files.kept_pieces import ToCut, kept_file, read_kept
 from ddenv.world.files.meshes import build, read_parts, surface_of, unpack, unpack_pieces
 from ddenv.world.files.roots import absolute, source_of
 from ddenv.world.files.triangles import Part
@@ -90,6 +91,8 @@ class Resources:
         self._files: dict[str, tuple[Path, bytes]] = {}
         self._meshes: dict[str, Mesh] = {}
         self._pieces: dict[str, list[Mesh]] = {}
+        # The meshes for `cut`, by the files of their pieces.
+        self.uncut: dict[Path, ToCut] = {}
         self._heights: dict[str, Floats] = {}
         self._failed: dict[str, Missing | Unusable] = {}
         # Collisions and visuals use the same files, and different parts of them; the longest known
@@ -127,12 +130,36 @@ class Resources:
     def pieces(self, part: MeshPart, scale: Vector, most: int) -> list[Mesh]:
         """The convex pieces of a mesh, in m and times `scale`, at most `most`; a mesh that is
         convex is a single one.
+
+        There are none before `cut`, nor where it cannot be cut.
         """
         key = part.key("pieces", scale, most)
-        if key not in self._pieces:
-            packed = self._bytes(key, lambda: _cut(self._parts(part), part, scale, most))
-            self._pieces[key] = unpack_pieces(key, packed)
+        if key in self._pieces:
+            return self._pieces[key]
+        if key not in self.taken and self._reads_disk:
+            vertices, faces = surface_of(self._parts(part), part.submesh, part.center)
+            mesh = vertices * np.array(scale), faces, most
+            file = kept_file(*mesh)
+            packed = read_kept(file)
+            if packed is None:
+                self.uncut[file] = mesh
+                return self._pieces.setdefault(key, [])
+            self.taken[key] = packed
+        self._pieces[key] = unpack_pieces(key, self._bytes(key, bytes))
         return self._pieces[key]
+
+    def cut(self) -> bool:
+        """Cuts the meshes whose pieces were asked for and not known; False if there is none. What
+        `watch.WATCH` raises ends it.
+        """
+        if not self.uncut:
+            return False
+        # Loaded late: most worlds have no such mesh.
+        from ddenv.world.files.cutting import cut
+
+        cut(self.uncut)
+        self._pieces.clear()
+        return True
 
     def heights(self, part: MeshPart) -> Floats:
         """The heights (R, C) in an image, as a share of the greatest; the first row has the least
@@ -236,15 +263,8 @@ class Resources:
         return found
 
 
-def _cut(parts: list[Part], part: MeshPart, scale: Vector, most: int) -> bytes:
-    # Loaded late: what was cut before is shown without it.
-    from ddenv.world.files.pieces import build_pieces
-
-    return build_pieces(parts, part.submesh, part.center, scale, most)
-
-
 def _heights_of(parts: list[Part], part: MeshPart, scale: Vector) -> bytes:
-    # Loaded late, too.
+    # Loaded late: what was read before is shown without it.
     from ddenv.world.files.surfaces import surface_heights
 
     vertices, faces = surface_of(parts, part.submesh, part.center)

@@ -16,7 +16,18 @@ from ddenv.world.extent import circle, convex_hull, polygon_area
 from ddenv.world.files.boxes import box_of
 from ddenv.world.files.meshes import convex_hull as hull
 from ddenv.world.files.resources import MeshPart
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere, Terrain
+from ddenv.world.model import (
+    UNCUT,
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    Mesh,
+    Plane,
+    Shape,
+    Sphere,
+    Terrain,
+)
 from ddenv.world.pose import HERE, ONE, Pose, Vector, pointing, vector
 from ddenv.world.sdf.context import Context, refuse
 from ddenv.world.sdf.standin import AUTO, NONE, SIZES, Placed
@@ -237,7 +248,8 @@ def _solid(
     if len(pieces) == 1 and (box := box_of(hull)) is not None:
         return Placed(*box)
     if len(pieces) < 2:
-        context.note("replaced", element, f"'{part.uri}' by its convex hull; {ROUGH}")
+        why = ROUGH if pieces or most == 1 else UNCUT
+        context.note("replaced", element, f"'{part.uri}' by its convex hull; {why}")
         return Placed(hull)
     context.note(
         "replaced", element, f"'{part.uri}' by its convex pieces; {ROUGH}", f"{len(pieces)} pieces"

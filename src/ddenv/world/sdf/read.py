@@ -45,8 +45,9 @@ def parse_world(
     context = Context(resources=resources or disk_of(path, reading), reading=reading)
     try:
         if is_directives(path):
-            return parse_directives(text, path, context)
-        return _world(text, path, context)
+            world = parse_directives(text, path, context)
+        else:
+            world = _world(text, path, context)
     except UserError:
         # The error may only be a consequence of a missing file, such as a pose relative to a model
         # in it.
@@ -54,6 +55,10 @@ def parse_world(
         raise
     except RecursionError:
         raise UserError(f"{path}: models or frames are nested too deeply") from None
+    # Which meshes are to be cut is known after a whole reading; with their pieces it is made again.
+    if context.resources.cut():
+        return parse_world(text, path, reading, context.resources)
+    return world
 
 
 def read_model(path: Path, reading: Reading = PLAIN) -> Model:
@@ -74,6 +79,8 @@ def parse_model(
     try:
         model = assemble(scope.parts[0], scope.parts[0].name, scope, None, context)
         context.complain_of_missing()
+        if context.resources.cut():
+            return parse_model(text, path, reading, context.resources)
         return without_mass(model, scope.parts[0].element)
     except RecursionError:
         raise UserError(f"{path}: models or frames are nested too deeply") from None
@@ -133,7 +140,8 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         ),
     )
     whole = context.recorded(whole)
-    if context.reading.inside:
+    # Of a mesh that is yet to be cut nothing can be opened.
+    if context.reading.inside and not context.resources.uncut:
         return _opened(whole, root, scope, context)
     return whole
 
