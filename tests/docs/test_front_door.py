@@ -67,9 +67,9 @@ WALKS = dict(
 
 
 @pytest.mark.parametrize("walk", WALKS)
-def test_a_walk_passes_through_at_most_ten_files(walk):
+def test_a_walk_passes_through_files_that_are_there(walk):
     files = re.findall(r"`([\w/]+\.py)`", WALKS[walk])
-    assert 0 < len(files) <= 10
+    assert files
     assert [file for file in files if not (ROOT / "src/ddenv" / file).is_file()] == []
 
 

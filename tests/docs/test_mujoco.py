@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ddenv.robot.external.python_simulator import PythonSimulator
-from ddenv.robot.simulation.plant_cache import Template
+from ddenv.robot.simulation.plant_cache import Plant
 from ddenv.runs.experiment import load_parts
 from ddenv.world.drive import find_drive
 from ddenv.world.load import SDF, load_scenario, load_simulator
@@ -241,7 +241,7 @@ def test_on_a_floor_cut_at_random_the_robot_ends_where_it_does_in_mujoco(tmp_pat
     (tmp_path / "floor.yaml").write_text(scenario)
     scenario = load_scenario(tmp_path / "floor.yaml")
     world, robot = load_parts(scenario)
-    in_drake = Template(world, robot, scenario).run(frozenset(world.elements()), 0)
+    in_drake = Plant(world, robot, scenario).run(frozenset(world.elements()), 0)
     elsewhere = scenario.model_copy(update={"oracle": load_simulator(FOLDER / "simulator.yaml")})
     simulator = PythonSimulator(load_parts(elsewhere)[0], elsewhere)
     in_mujoco = simulator.run(frozenset(world.elements()), 0)
