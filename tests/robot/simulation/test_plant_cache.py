@@ -11,7 +11,7 @@ import pytest
 
 from ddenv.engine.mcap_file import Streams
 from ddenv.errors import UserError
-from ddenv.robot.simulation import template as variants
+from ddenv.robot.simulation import plant_cache
 from ddenv.robot.simulation.plant_cache import Plant, PlantCache
 from ddenv.runs.experiment import load_parts
 from ddenv.world.load import SCENARIOS, load_scenario
@@ -207,8 +207,8 @@ def built(monkeypatch) -> list[frozenset[str]]:
     """The moving models that are left out of each smaller plant which is built. Building is so
     cheap that it always pays.
     """
-    monkeypatch.setattr(variants, "BUILD", 0.0)
-    monkeypatch.setattr(variants, "PAIR", 0.0)
+    monkeypatch.setattr(plant_cache, "BUILD", 0.0)
+    monkeypatch.setattr(plant_cache, "PAIR", 0.0)
     reported: list[frozenset[str]] = []
     without = Plant.without
 
@@ -286,7 +286,7 @@ def test_a_plant_is_built_once_while_it_is_asked_for(cubes, husky, scenario, bui
         smaller.run(ALL - {"a"}, seed)
     assert built == [{"a"}]
     # Those that were used last are held.
-    monkeypatch.setattr(variants, "MOST", 2)
+    monkeypatch.setattr(plant_cache, "MOST", 2)
     for left_out in ("b", "a", "c", "a", "b"):
         smaller.run(ALL - {left_out}, 1)
     assert built == [{"a"}, {"b"}, {"c"}, {"b"}]
@@ -299,7 +299,7 @@ TOO_DEAR = {"BUILD": 1.0, "PAIR": 1.0, "LARGEST": 3, "HELD": 0.0}
 def test_no_plant_is_built_that_costs_more_than_it_saves(
     cubes, husky, scenario, built, monkeypatch, limit
 ):
-    monkeypatch.setattr(variants, limit, TOO_DEAR[limit])
+    monkeypatch.setattr(plant_cache, limit, TOO_DEAR[limit])
     result = PlantCache(cubes, husky, scenario).run(ALL - {"d"}, 1)
     assert not built
     assert all_bits(result) == all_bits(Plant(cubes, husky, scenario).run(ALL - {"d"}, 1))
