@@ -121,8 +121,9 @@ class Filter:
         wheels = SKIDDING**2
         self._trust = wheels / (gyro + wheels)
         self._rate_variance = gyro * wheels / (gyro + wheels)
-        # The upper half of the covariance of x, y, heading h and bias b.
-        self._xx = self._xy = self._xh = self._xb = 0.0
+        # The upper half of the covariance of x, y, heading h and bias b, but for that of x with y,
+        # which nothing needs.
+        self._xx = self._xh = self._xb = 0.0
         self._yy = self._yh = self._yb = 0.0
         self._hh = self._hb = 0.0
         self._bb = sensors.gyro_bias**2
@@ -172,7 +173,6 @@ class Filter:
         y_h = self._yh + yh * hh + yb * h_b
         y_b = self._yb + yh * h_b + yb * bb
         self._xx += xh * (self._xh + x_h) + xb * (self._xb + x_b)
-        self._xy += xh * self._yh + xb * self._yb + yh * x_h + yb * x_b
         self._yy += yh * (self._yh + y_h) + yb * (self._yb + y_b)
         self._xh = x_h + hb * x_b
         self._xb = x_b
@@ -183,7 +183,6 @@ class Filter:
         along = (SLIPPING * way) ** 2
         turned = self._rate_variance * seconds * seconds + UNSEEN**2 * seconds
         self._xx += along * cosine * cosine
-        self._xy += along * cosine * sine
         self._yy += along * sine * sine
         self._hh += turned
 
@@ -204,7 +203,6 @@ class Filter:
         hh = self._hh
         hb = self._hb
         self._xx -= kx * xh
-        self._xy -= kx * yh
         self._xh -= kx * hh
         self._xb -= kx * hb
         self._yy -= ky * yh
