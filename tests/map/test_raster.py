@@ -27,7 +27,8 @@ from ddenv.map.raster import (
 )
 from ddenv.workbench.map.map_colors import mixed
 from ddenv.workbench.map.model_looks import Kept, fill, looks
-from ddenv.world.extent import convex_hull, polygon_area
+from ddenv.world.extent import polygon_area
+from ddenv.world.hull import convex_outline
 from ddenv.world.pose import heading
 from tests.map.worlds import GROUND, box, world_of
 from tests.tiers import examples
@@ -116,7 +117,7 @@ models = st.lists(st.lists(clouds, max_size=2), max_size=6)
 def prints_of_shapes(shapes) -> list[Footprint]:
     prints = []
     for number, parts in enumerate(shapes):
-        polygons = tuple(convex_hull(np.array(points)) for points in parts)
+        polygons = tuple(convex_outline(np.array(points)) for points in parts)
         corners = np.vstack(polygons) if polygons else np.array([[number - 3.0, 0.5]])
         low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
         prints.append(Footprint(f"m{number}", polygons, tuple(low), tuple(high)))

@@ -383,6 +383,11 @@ def test_the_camera_sees_the_robot_go_to_the_right():
     assert seen.center == (5, 0, 0)
     assert seen.camera[1] < 0 < seen.camera[2]
     assert view((1.0, 1.0, 0.0), (1.0, 1.0, 0.0)).radius > 0
+    # Over a wall that would hide the robot, but not for the sake of one behind it.
+    wall = box((12.0, 0.2, 3.0))
+    before, behind = (view((0, 0, 0), (10, 0, 0), wall.at(Pose((5, y, 1.5)))) for y in (-1.5, 1.5))
+    assert behind.camera == seen.camera
+    assert before.camera[2] > 1.4 * seen.camera[2]
     # What is drawn around a small robot is small.
     assert scale_of((0, 0, 0), (0.5, 0, 0)) < 0.5 < scale_of((0, 0, 0), (6, 0, 0)) == 1
     assert view((0, 0, 0), (0.5, 0, 0)).radius < 1

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ddenv.world.files.meshes import convex_hull
+from ddenv.world.hull import convex_hull
 from ddenv.world.load import SDF
 from ddenv.world.model import Box, Collision, Cylinder, Link, Mesh, Model, Plane, World
 from ddenv.world.passage import CELL, clearance

@@ -117,7 +117,7 @@ def world_report(world: World) -> Data:
         models.append(
             {
                 "name": model.name,
-                "kind": _kind(model),
+                "kind": _kind(world, model),
                 "removable": model.name in removable,
                 "line": model.line,
                 "pose": [*model.pose.position, *model.pose.quaternion],
@@ -167,10 +167,8 @@ def _notes(world: World, *models: str) -> list[dict[str, str]]:
     ]
 
 
-def _kind(model: Model) -> str:
-    from ddenv.world.model import is_ground
-
-    if is_ground(model):
+def _kind(world: World, model: Model) -> str:
+    if model.name in world.ground:
         return "ground"
     if model.static:
         return "static"
@@ -279,7 +277,7 @@ def _table(world: World, notes: Mapping[str, Iterable[str]], columns: int | None
         box = model_bounds(model)
         cells = (
             shortened(model.name, LONGEST_NAME),
-            _kind(model),
+            _kind(world, model),
             str(len(model.links)),
             ", ".join(f"{number} {shape}" for shape, number in _shapes(model).items()) or "none",
             "" if box is None else " x ".join(f"{part:.2f}" for part in box[1] - box[0]),

@@ -16,7 +16,7 @@ import numpy as np
 
 from ddenv.map.raster import extent
 from ddenv.text import plain, shortened, width
-from ddenv.world.extent import convex_hull
+from ddenv.world.hull import convex_outline
 from ddenv.world.pose import Point
 
 if TYPE_CHECKING:
@@ -182,8 +182,9 @@ def path_of(each: Drawn, frame: Frame, coarse: bool = False) -> str:
     if not polygons:
         x, y = frame.pixel(each.outline.center)
         return f"M{x - CROSS:.1f} {y - CROSS:.1f}l8 8m0 -8l-8 8"
-    shapes = [convex_hull(np.vstack(polygons))] if coarse and not each.outline.hollow else polygons
-    corners = (frame.pixels(shape) for shape in shapes)
+    if coarse and not each.outline.hollow:
+        polygons = (convex_outline(np.vstack(polygons)),)
+    corners = (frame.pixels(polygon) for polygon in polygons)
     return "".join("M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in shape) + "Z" for shape in corners)
 
 

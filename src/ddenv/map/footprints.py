@@ -12,14 +12,14 @@ import numpy as np
 from ddenv.map.colors import RGB
 from ddenv.world.extent import (
     circle,
-    convex_hull,
     filled_bounds,
     model_bounds,
     polygon_area,
     shape_bounds,
     vertices_of,
 )
-from ddenv.world.model import Box, Ground, Model, Plane, World, is_ground
+from ddenv.world.hull import convex_outline
+from ddenv.world.model import Box, Model, Plane, Terrain, World
 from ddenv.world.pose import HERE, Point, Pose, Vector, vector
 
 # Corners of the polygon that stands for a circle on a character map.
@@ -82,9 +82,15 @@ def footprints(world: World) -> tuple[Footprint, ...]:
     ones are drawn on top.
     """
     ground = ground_height(world)
-    prints = [footprint(model, ground=ground) for model in world.models if not is_ground(model)]
+    prints = [footprint(model, ground=ground) for model in without_ground(world)]
     # Equal models that are turned differ only by rounding: they stay in the file's order.
     return tuple(sorted(prints, key=lambda each: -round(each.covered, 6)))
+
+
+def without_ground(world: World) -> list[Model]:
+    """The models that are not the ground of all others."""
+    ground = world.ground
+    return [model for model in world.models if model.name not in ground]
 
 
 def ground_height(world: World) -> float:
@@ -118,12 +124,14 @@ def footprint(
     if math.isinf(ground):
         ground = min((foot for _, foot in pieces), default=0.0)
     for each, foot in pieces:
-        if not isinstance(each.shape, Ground) and foot <= ground + HEAD:
+        hangs = foot > ground + HEAD and not isinstance(each.shape, Terrain)
+        if not hangs and not isinstance(each.shape, Plane):
             pose = moved @ each.pose
-            vertices, radius = vertices_of(each.shape, corners)
+            shape = Box((*each.shape.size, 0.0)) if isinstance(each.shape, Terrain) else each.shape
+            vertices, radius = vertices_of(shape, corners)
             flat = vertices @ pose.rotation()[:2].T + pose.position[:2]
             around = (flat[:, None] + radius * circle(corners)).reshape(-1, 2) if radius else flat
-            polygons += [outline] if len(outline := convex_hull(around)) else []
+            polygons += [outline] if len(outline := convex_outline(around)) else []
     points = np.vstack(polygons) if polygons else np.array([(moved @ model.pose).position[:2]])
     low = points.min(axis=0)
     high = points.max(axis=0)
@@ -178,7 +186,7 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
     Of equal tops the larger model comes first. Circles become polygons with `corners` corners.
     """
     ground = ground_height(world)
-    models = [model for model in world.models if not is_ground(model)]
+    models = without_ground(world)
     outlines = [footprint(model, corners, ground=ground) for model in models]
     if models:
         limit = max(FLOOR_AREA, FLOOR_FACTOR * float(np.median([each.area for each in outlines])))

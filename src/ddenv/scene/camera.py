@@ -7,8 +7,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from ddenv.scene import colors
 from ddenv.scene.draw import WORLD
+from ddenv.scene.mesh import EMPTY, Surface, hides
 from ddenv.scene.stage import DRAWN, Stage
 from ddenv.world.pose import Pose, Vector, vector
 
@@ -17,7 +20,11 @@ from ddenv.world.pose import Pose, Vector, vector
 NEAR = 1.5
 SMALLEST = 0.1
 FIELD_OF_VIEW = 38.0  # vertical, degrees
-ELEVATION = 32.0  # of the camera above the horizon, degrees
+# Of the camera above the horizon, degrees: the first from which most of the way is seen, over the
+# walls of a building.
+ELEVATIONS = (32.0, 50.0, 68.0)
+SEEN = 5  # places of the way that are looked at
+EYE = 0.3  # their height above the ground, m
 ASIDE = 20.0  # rotation of the camera from perpendicular to the path towards the start, degrees
 _CAMERA = ("Cameras", "default", "rotated", DRAWN)
 
@@ -39,15 +46,20 @@ def scale_of(start: Vector, goal: Vector) -> float:
     return min(1.0, max(SMALLEST, math.dist(start[:2], goal[:2]) / NEAR))
 
 
-def view(start: Vector, goal: Vector) -> View:
-    """The view of a robot that moves from `start` to `goal`."""
+def view(start: Vector, goal: Vector, around: Surface = EMPTY) -> View:
+    """The view of a robot that moves from `start` to `goal`, and is seen over what is `around`."""
     dx = goal[0] - start[0]
     dy = goal[1] - start[1]
     scale = scale_of(start, goal)
     radius = max(2.5 * scale, 0.5 * math.hypot(dx, dy) + 1.8 * scale)
     along = math.atan2(dy, dx)
     center = vector(0.5 * (a + b) for a, b in zip(start, goal, strict=True))
-    camera = _polar(2.2 * radius, along - math.radians(90 + ASIDE), ELEVATION)
+    cameras = [
+        _polar(2.2 * radius, along - math.radians(90 + ASIDE), elevation)
+        for elevation in ELEVATIONS
+    ]
+    places = np.linspace(start, goal, SEEN) + np.array([0.0, 0.0, EYE * scale])
+    camera = min(cameras, key=lambda camera: sum(hides(around, place, camera) for place in places))
     sun = _polar(3.0 * radius, along - math.radians(165), 50.0)
     return View(center, camera, sun, radius)
 

@@ -30,7 +30,7 @@ from ddenv.world.model import (
     Terrain,
     Visual,
 )
-from ddenv.world.pose import Point, Pose
+from ddenv.world.pose import Point, Pose, Vector
 from ddenv.world.terrain import surface
 
 SIDES = 24  # of the polygon that stands for a circle
@@ -261,6 +261,16 @@ def height_at(surface: Surface, x: float, y: float) -> float | None:
     if len(heights):
         return float(heights.max())
     return None
+
+
+def hides(surface: Surface, place: np.ndarray, way: Vector) -> bool:
+    """Whether a face is met from `place` (3,) m on the `way` (3,), which leads upwards."""
+    x, y, z = way
+    vertices = surface.vertices - place
+    # All faces are moved so that the way is upright.
+    vertices -= vertices[:, 2:] * (x / z, y / z, 0.0)
+    highest = height_at(replace(surface, vertices=vertices), 0.0, 0.0)
+    return (highest or 0.0) > 0.0
 
 
 def _sheet(rows: int, columns: int) -> np.ndarray:

@@ -69,7 +69,7 @@ class Player:
             (place.x, place.y, self._scenery.height(place.x, place.y))
             for place in (scenario.robot.spawn, scenario.goal)
         )
-        set_up(stage, view(start, end))
+        set_up(stage, view(start, end, self._scenery.surface))
         self._scenery.scale = scale = scale_of(start, end)
         mark(stage, "start", start, 0.6 * scale, colors.START, scale)
         mark(stage, "goal", end, scenario.goal.tolerance, colors.GOAL, scale, FLAG)

@@ -1,6 +1,4 @@
-"""The extent of shapes and models: boxes in the world frame, m, also in place of endless planes;
-and convex hulls in the plane.
-"""
+"""The extent of shapes and models: boxes in the world frame, m, also in place of endless planes."""
 
 from __future__ import annotations
 
@@ -27,7 +25,7 @@ from ddenv.world.model import (
     Terrain,
     World,
 )
-from ddenv.world.pose import HERE, Point, Pose, Vector, vector
+from ddenv.world.pose import HERE, Pose, Vector, vector
 
 Bounds = tuple[np.ndarray, np.ndarray]
 
@@ -160,27 +158,6 @@ def model_bounds(model: Model) -> Bounds | None:
     touch.
     """
     return bounds(model.collisions)
-
-
-def convex_hull(points: np.ndarray) -> np.ndarray:
-    """The corners (M, 2) of the convex hull of `points` (N, 2), anticlockwise (Andrew's monotone
-    chain).
-    """
-    ordered = sorted({(round(float(x), 6), round(float(y), 6)) for x, y in points})
-    if len(ordered) < 3:
-        return np.array(ordered).reshape(-1, 2)
-    corners: list[Point] = []
-    for side in (ordered, ordered[::-1]):
-        chain: list[Point] = []
-        for x, y in side:
-            while len(chain) > 1:
-                (ax, ay), (bx, by) = chain[-2:]
-                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0:
-                    break
-                chain.pop()
-            chain.append((x, y))
-        corners += chain[:-1]
-    return np.array(corners)
 
 
 def polygon_area(corners: np.ndarray) -> float:

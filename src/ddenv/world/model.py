@@ -346,9 +346,26 @@ class World:
         while new:
             new = frozenset(other for model, other in self.ties if model in new) - stay
             stay |= new
-        return tuple(
-            model.name for model in self.models if model.name not in stay and not is_ground(model)
-        )
+        stay |= self.ground
+        return tuple(name for name in self.names if name not in stay)
+
+    @property
+    def ground(self) -> frozenset[str]:
+        """The names of the models that carry all others, and so are no elements: ground
+        (`is_ground`), except for its tiles.
+
+        Models of terrain are tiles if there are several of them: a trench in one is found like any
+        other model.
+        """
+        grounds = frozenset(model.name for model in self.models if is_ground(model))
+        terrain = [
+            model.name
+            for model in self.models
+            if any(isinstance(one.shape, Terrain) for one in model.collisions)
+        ]
+        if len(terrain) < 2:
+            return grounds
+        return grounds.difference(terrain)
 
 
 # A box drawn as an infinite plane, and at least this long and wide, stands for one, m.
@@ -358,8 +375,6 @@ ENDLESS = 200.0
 def is_ground(model: Model) -> bool:
     """Whether the model holds terrain, an infinite plane, or a box that stands for one (as
     `ddenv.world.write` writes it).
-
-    The ground carries everything else: it is never an element.
     """
     if any(isinstance(collision.shape, Ground) for collision in model.collisions):
         return True

@@ -17,6 +17,7 @@ import numpy as np
 
 from ddenv.arrays import Booleans, Floats
 from ddenv.world.extent import shape_bounds, vertices_of
+from ddenv.world.hull import half_spaces
 from ddenv.world.model import Collision, Ellipsoid, Ground, World
 from ddenv.world.pose import Point
 
@@ -127,15 +128,13 @@ def _distances(inside: Booleans) -> Floats:
 
 def _tops(one: Collision, middles: Floats, cell: float) -> Floats:
     """How high a shape is in columns (N, M), m: minus infinity where it is not."""
-    from scipy.spatial import ConvexHull
-
     corners, radius = vertices_of(one.shape)
     if radius:
         corners = (corners[:, None] + radius * BALL).reshape(-1, 3)
     corners = corners @ one.pose.rotation().T + one.pose.position
     tops = np.full(middles.shape[:2], math.inf)
     bottoms = -tops
-    for *ahead, up, offset in ConvexHull(corners, qhull_options="QJ").equations:
+    for *ahead, up, offset in half_spaces(corners, joggle=True):
         # What is thinner than a column must not vanish between the middles of two.
         thin = max(0.0, cell * math.hypot(*ahead) - np.ptp(corners[:, :2] @ ahead))
         rest = thin / 2 + GAP - offset - middles @ ahead

@@ -24,6 +24,7 @@ from ddenv.world.extent import (
     stacked,
     vertices_of,
 )
+from ddenv.world.hull import half_spaces
 from ddenv.world.model import Collision, Ground, Mesh, Model, Plane, Terrain, World, is_ground
 from ddenv.world.passage import Clearance, clearance
 from ddenv.world.pose import Pose
@@ -445,16 +446,13 @@ def hull(collision: Collision, place: Pose | None = None) -> Hull:
 
 def overlap(a: Hull, b: Hull) -> float:
     """The shortest move that separates two convex bodies, m; 0 if they do not overlap."""
-    # Loaded only when it is needed: views run without it.
-    from scipy.spatial import ConvexHull, QhullError
-
     grown = a.radius + b.radius
     differences = _differences(a, b)
     if (differences.min(axis=0) > grown).any() or (differences.max(axis=0) < -grown).any():
         return 0.0
     try:
-        depth = -float(ConvexHull(differences).equations[:, 3].max())
-    except QhullError:
+        depth = -float(half_spaces(differences)[:, 3].max())
+    except ValueError:
         # All in one plane: two segments, or points.
         depth = 0.0
     if depth > 0.0:

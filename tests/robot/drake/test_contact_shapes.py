@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from ddenv.robot.drake.contact_shapes import Wheel, contact_shapes, cylinder, prism, tyre, wheel_of
 from ddenv.robot.drake.mesh_pieces import LONGEST, pieces
 from ddenv.world.extent import shape_bounds
-from ddenv.world.files.meshes import convex_hull
+from ddenv.world.hull import convex_hull
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import joint_of, link_of, model_of, wedge

@@ -18,7 +18,7 @@ from ddenv.robot.drake import contact_shapes
 from ddenv.robot.drake.contact_shapes import Placed
 from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.plant_cache import Plant
-from ddenv.world.files.meshes import convex_hull
+from ddenv.world.hull import convex_hull
 from ddenv.world.model import Box, Collision, Cylinder, Inertia, Link, Mesh, Model, Sphere
 from ddenv.world.pose import HERE, Pose
 from tests.robot.conftest import bits, cube

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,21 +13,26 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from ddenv.world import scenario
-from ddenv.world.files.meshes import convex_hull
+from ddenv.world.extent import vertices_of
+from ddenv.world.files.boxes import box_of
+from ddenv.world.files.pieces import convex_pieces, extruded
+from ddenv.world.hull import convex_hull
 from ddenv.world.model import (
     Box,
     Capsule,
+    Collision,
     Cylinder,
     Ellipsoid,
     Mesh,
     Model,
+    Piece,
     Plane,
     Shape,
     Sphere,
     Terrain,
 )
 from ddenv.world.pose import Pose
-from tests.robot.sensing.conftest import lidar_of, loose, scan, still
+from tests.robot.sensing.conftest import lidar_of, loose, plain, scan, still
 from tests.tiers import examples
 
 # How deep a beam has to get into a shape, or how far to pass it, for both ways to agree on whether
@@ -240,3 +247,81 @@ def test_beams_end_on_the_slope_of_terrain_and_pass_over_what_is_lower():
     # Not from below, and not above its end.
     assert np.isinf(scan(lidar_of(ground, settings=lidar), Pose((4.0, 0.0, 1.0))).ranges).all()
     assert np.isinf(scan(lidar_of(ground, settings=lidar), Pose((0.0, 0.0, 2.1))).ranges).all()
+
+
+def room(turn: float) -> tuple[Model, np.ndarray]:
+    """A house of one room, cut in pieces, with two pillars along each of its five walls; and these
+    walls as half planes (5, 3).
+    """
+    corners = np.array([[-3.0, -2.0], [2.5, -2.5], [4.0, 0.5], [0.3, 3.5], [-3.5, 2.0]])
+    cosine, sine = math.cos(turn), math.sin(turn)
+    corners @= np.array([[cosine, sine], [-sine, cosine]])
+    outline = []
+    for start, end in pairwise([*corners, corners[0]]):
+        inward = np.array([start[1] - end[1], end[0] - start[0]]) / np.linalg.norm(end - start)
+        outline.append(start)
+        for share, depth in (
+            (0.2, 0.0),
+            (0.2, 0.3),
+            (0.3, 0.3),
+            (0.3, 0.0),
+            (0.7, 0.0),
+            (0.7, 0.1),
+            (0.8, 0.1),
+            (0.8, 0.0),
+        ):
+            outline.append(start + share * (end - start) + depth * inward)
+    vertices, faces = extruded([1.1 * corners, np.array(outline)], 2.0)
+    whole = Mesh("house", vertices, faces)
+    pieces = [Mesh("piece", *piece) for piece in convex_pieces(vertices, faces, 64)]
+    collisions = [
+        Collision(name="c", shape=shape, pose=pose, mu=1.0, piece=Piece(whole, pose))
+        for shape, pose in (box_of(piece) or (piece, Pose()) for piece in pieces)
+    ]
+    house = still("house", Box((1.0, 1.0, 1.0)), Pose())
+    links = (replace(house.links[0], collisions=tuple(collisions)),)
+    return replace(house, links=links), ConvexHull(corners).equations
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, 1.0])
+def test_no_beam_passes_between_two_pieces_of_a_wall(turn):
+    house, walls = room(turn)
+    assert len(house.collisions) >= 15
+    sensor = lidar_of(house, settings=plain(beams=721, angle=math.tau, range=30.0))
+
+    def beyond(x: float, y: float, yaw: float) -> np.ndarray:
+        """How much farther than the walls beams (N,) go, m; less than 0 for those that end on a
+        pillar.
+        """
+        found = scan(sensor, Pose.from_rpy(x, y, 1.0, 0.0, 0.0, yaw))
+        ways = np.stack([np.cos(found.angles + yaw), np.sin(found.angles + yaw)])
+        rise = walls[:, :2] @ ways
+        distances = -(walls[:, :2] @ (x, y) + walls[:, 2])[:, None]
+        return found.ranges - np.where(rise > 1e-9, distances / np.maximum(rise, 1e-9), np.inf).min(
+            axis=0
+        )
+
+    def agrees(*pose: float) -> None:
+        more = beyond(*pose)
+        assert more.max() < 1e-5
+        assert np.median(more) > -5e-4
+
+    random = np.random.default_rng(5)
+    for _ in range(20):
+        agrees(*random.uniform(-1.5, 1.5, 2), random.uniform(-math.pi, math.pi))
+    # A beam along each face of a piece, or micrometres beside it, from where there is no pillar:
+    # some of them are seams.
+    checked = 0
+    for piece in house.collisions:
+        corners, _ = vertices_of(piece.shape)
+        for x, y, up, offset in ConvexHull(
+            corners @ piece.pose.rotation().T + piece.pose.position
+        ).equations:
+            for beside in (0.0, *random.normal(0.0, 3e-6, 4)):
+                start = random.uniform(-1.0, 1.0, 2)
+                start -= (start @ (x, y) + offset + beside) * np.array([x, y])
+                inside = (walls[:, :2] @ start + walls[:, 2]).max() < -0.35
+                if abs(up) < 1e-6 and inside:
+                    agrees(*start, math.atan2(x, -y))
+                    checked += 1
+    assert checked >= 20

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world.access import Unusable
-from ddenv.world.files import meshes
 from ddenv.world.files.meshes import SUFFIXES, read_parts
 from tests.world.files.mesh_files import BOX, bounds, dae, gltf, mesh_of, solid
 
@@ -187,19 +186,6 @@ def test_flat_meshes_get_a_thin_hull(tmp_path, points, volume):
     mesh = mesh_of(tmp_path / "a.obj", f"{points}\nf 1 2 3", convex=True)
     assert solid(mesh).is_watertight
     assert solid(mesh).volume == pytest.approx(volume, rel=1e-6)
-
-
-def test_the_hull_of_many_points_keeps_their_extent(monkeypatch):
-    ball = np.random.default_rng(1).normal(size=(3000, 3))
-    monkeypatch.setattr(meshes, "MANY_POINTS", 1000)
-    monkeypatch.setattr(meshes, "CHUNK", 700)
-    for points in (ball, ball / np.linalg.norm(ball, axis=1)[:, None], ball * [5, 1, 1e-9]):
-        vertices, _ = meshes.convex_hull(points)
-        assert np.allclose(
-            [vertices.min(axis=0), vertices.max(axis=0)],
-            [points.min(axis=0), points.max(axis=0)],
-            atol=0.01,
-        )
 
 
 @pytest.mark.parametrize("suffix", ["stl", "obj", "glb"])

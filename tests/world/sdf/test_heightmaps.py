@@ -15,6 +15,7 @@ import trimesh
 from PIL import Image
 
 from ddenv.errors import UserError
+from ddenv.map.footprints import footprints
 from ddenv.world.files.resources import Resources
 from ddenv.world.model import World, is_ground
 from ddenv.world.sdf.read import parse_world
@@ -58,6 +59,21 @@ def test_the_brightest_pixel_is_as_high_as_the_heightmap_and_the_first_row_is_at
     assert heights(world, [-2, 0, 2, 2, 1], [1, 1, 1, -1, 0]) == pytest.approx([0, 2, 4, 10, 5.25])
     assert np.isnan(heights(world, [2.01, 0], [0, -1.01])).all()
     assert is_ground(world.models[0]) and not world.elements()
+
+
+def test_several_models_of_ground_are_tiles_that_can_be_removed(read, tmp_path):
+    (tmp_path / "hill.png").write_bytes(png(HEIGHTS))
+    plane = "<geometry><plane/></geometry>"
+    floor = (
+        "<model name='floor'><static>true</static><link name='l'><collision "
+        f"name='c'>{plane}</collision></link></model>"
+    )
+    world = read(floor + heightmap() + heightmap().replace("'hill'", "'other'"))
+    assert world.elements() == ("hill", "other") and world.ground == {"floor"}
+    assert [(each.name, each.low, each.high) for each in footprints(world)] == [
+        (name, (-1.0, 1.0), (3.0, 3.0)) for name in world.elements()
+    ]
+    assert read(floor + heightmap()).elements() == ()
 
 
 def test_what_was_read_is_read_again_without_the_image(read, tmp_path):

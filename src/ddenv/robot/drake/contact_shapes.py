@@ -19,7 +19,7 @@ import numpy as np
 from ddenv.arrays import Floats
 from ddenv.robot.drake.mesh_pieces import pieces
 from ddenv.world.extent import vertices_of
-from ddenv.world.files.meshes import convex_hull
+from ddenv.world.hull import convex_hull
 from ddenv.world.model import (
     Box,
     Capsule,

@@ -15,7 +15,7 @@ import trimesh
 
 from ddenv.arrays import Floats
 from ddenv.world.files.boxes import box_of
-from ddenv.world.files.meshes import convex_hull
+from ddenv.world.hull import convex_hull
 from ddenv.world.model import Cylinder, Mesh, Shape
 from ddenv.world.pose import HERE, Pose, pointing, vector
 

@@ -13,11 +13,11 @@ from pydrake import geometry as drake
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction
-from scipy.spatial import ConvexHull, QhullError
 
 from ddenv.arrays import Floats
 from ddenv.robot.drake.contact_shapes import contact_shapes, turning_joints
 from ddenv.world.drive import Drive, wheel_links
+from ddenv.world.hull import outermost
 from ddenv.world.model import (
     Box,
     Capsule,
@@ -161,12 +161,12 @@ def resting_corners(collisions: Sequence[Collision]) -> list[list[Vector]]:
         [(each.pose @ Pose(corner)).position for each, found in pairs for corner in found]
     )
     try:
-        outermost = set(ConvexHull(places).vertices.tolist())
-    except QhullError:
+        chosen = set(outermost(places).tolist())
+    except ValueError:
         # All in one plane.
         return corners
     numbers = count()
-    return [[corner for corner in found if next(numbers) in outermost] for found in corners]
+    return [[corner for corner in found if next(numbers) in chosen] for found in corners]
 
 
 def drake_shape(shape: Shape) -> drake.Shape:

@@ -56,6 +56,9 @@ BOUNDS = np.arange(len(KINDS) + 1)
 SPARE = 1e-6
 PLANE = 2e4  # a plane is the top of a cube of this size, m: what lies below it is inside
 THINNEST = 1e-9  # the minimum half thickness of a shape, m
+# Pieces of a mesh are cast as so much larger on each side, m: cutting leaves gaps of micrometres
+# between them.
+SEAM = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +118,7 @@ class Obstacles:
 
     @classmethod
     def of(cls, world: World) -> Obstacles:
-        found: list[tuple[int, int, Shape, Pose]] = []
+        found: list[tuple[int, int, Shape, Pose, float]] = []
         for owner, model in enumerate(world.models):
             still = {link.name for link in still_links(model)}
             for number, link in enumerate(model.links):
@@ -123,12 +126,16 @@ class Obstacles:
                 frame = Pose() if fixed else link.pose.inverse()
                 for one in link.collisions:
                     pose = frame @ one.pose @ Pose(_extent(one.shape)[0])
-                    found.append((owner, -1 if fixed else number, one.shape, pose))
+                    more = 0.0 if one.piece is None else SEAM
+                    found.append((owner, -1 if fixed else number, one.shape, pose, more))
         found.sort(key=lambda one: KIND_OF[type(one[2])])
-        owners, links, shapes, poses = zip(*found, strict=True) if found else ((), (), (), ())
+        owners, links, shapes, poses, grown = (
+            zip(*found, strict=True) if found else ((), (), (), (), ())
+        )
         sizes = np.maximum(
             np.array([_extent(shape)[1] for shape in shapes]).reshape(-1, 3), THINNEST
         )
+        sizes += np.array(grown).reshape(-1, 1)
         halves = sizes.T.copy()
         squares = halves * halves
         turns = np.array([pose.rotation() for pose in poses]).reshape(-1, 3, 3).transpose(1, 2, 0)
@@ -226,34 +233,43 @@ def _dot(a: Floats, b: Floats) -> Floats:
     return dot
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Facets:
     """A convex mesh as the intersection of the half spaces behind its faces, in the frame in which
     it lies between -1 and 1.
 
     `corners` (3, V) are its vertices, `faces` (3, M) indices of vertices. A point p is behind face
-    m if `normals[:, m] @ p <= offsets[m]`; `normals` (3, M), `offsets` (M,).
+    m if `normals[:, m] @ p <= offsets[m]`; `normals` (3, M), `offsets` (M,). It is larger than the
+    hull of its corners by a box of half the size `spare` (3,).
     """
 
     corners: Floats
     faces: Integers
     normals: Floats
     offsets: Floats
+    spare: Floats
 
     @classmethod
     def of(cls, mesh: Mesh, middle: Floats, half: Floats) -> Facets:
-        """The facets of `mesh`, whose box has its centre at `middle` (3,) m and half the size
-        `half` (3,) m.
+        """The facets of `mesh`, whose box has its centre at `middle` (3,) m; it is made larger, to
+        half the size `half` (3,) m.
         """
         corners = (mesh.vertices - middle) / half
+        spare = 1.0 - np.abs(corners).max(axis=0)
         start, second, third = (corners[mesh.faces[:, number]] for number in range(3))
         normals = np.cross(second - start, third - start)
         sizes = np.sqrt((normals * normals).sum(axis=1))
         faces = mesh.faces[sizes > 0]
         normals = normals[sizes > 0] / sizes[sizes > 0, None]
         # A sliver's normal may be wrong: with this offset its face still cuts off no vertex.
-        offsets = (normals @ corners.T).max(axis=1)
-        return cls(corners.T.copy(), faces.T.copy(), normals.T.copy(), offsets)
+        offsets = (normals @ corners.T).max(axis=1) + np.abs(normals) @ spare
+        return cls(
+            corners=corners.T.copy(),
+            faces=faces.T.copy(),
+            normals=normals.T.copy(),
+            offsets=offsets,
+            spare=spare,
+        )
 
     def cast(self, start: Floats, way: Floats, normal: Floats, _range: float) -> Interval:
         """Where beams from `start` (3,) along `way` (3, P), orthogonal to `normal` (3,), enter and
@@ -263,7 +279,8 @@ class Facets:
         heights = (normal[0] * corners[0] + normal[1] * corners[1] + normal[2] * corners[2])[
             self.faces
         ]
-        (cut,) = ((heights.min(axis=0) <= 0) & (heights.max(axis=0) >= 0)).nonzero()
+        more = np.abs(normal) @ self.spare
+        (cut,) = ((heights.min(axis=0) <= more) & (heights.max(axis=0) >= -more)).nonzero()
         if not len(cut):
             return np.full(way.shape[1], np.inf), np.full(way.shape[1], -np.inf)
         out = self.normals.take(cut, axis=1)[:, :, None]

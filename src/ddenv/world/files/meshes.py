@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import math
 import struct
 import warnings
 from pathlib import Path
@@ -26,8 +25,8 @@ from ddenv.world.access import Unusable, read
 from ddenv.world.files.dae import read_dae
 from ddenv.world.files.gltf import read_gltf
 from ddenv.world.files.triangles import Part, check_count, chosen, joined, read_obj, read_stl
+from ddenv.world.hull import Surface, convex_hull
 from ddenv.world.model import Mesh
-from ddenv.world.pose import Vector
 
 SUFFIXES = (".obj", ".stl", ".dae", ".gltf", ".glb")
 MESH_LIMIT = 200_000_000  # bytes of a file
@@ -39,8 +38,6 @@ _MAGIC = b"ddmesh1\0"
 _MAGIC_HULL = b"ddmesh1h"
 _HEADER = struct.Struct("<8sIII")
 _COUNT = struct.Struct("<I")
-# Vertices (N, 3) m, and outward faces (M, 3) as their indices.
-Surface = tuple[np.ndarray, np.ndarray]
 
 
 def read_parts(path: Path) -> list[Part]:
@@ -188,128 +185,3 @@ def unpack_pieces(name: str, packed: bytes) -> list[Mesh]:
         pieces.append(unpack(f"{name} {number}", packed[start : start + size]))
         start += size
     return pieces
-
-
-# Maximum number of vertices: a finer hull only makes every time step slower.
-MOST_VERTICES = 256
-# A hull thinner than `THIN_RATIO` of its size is thickened to `THICKNESS` m, or to
-# `THICKNESS_RATIO` of a large size.
-THIN_RATIO = 1e-5
-THICKNESS = 1e-3
-THICKNESS_RATIO = 1e-4
-# Of more points only the most extreme ones count: Qhull takes 10 s and 300 MB for so many on a
-# ball.
-MANY_POINTS = 300_000
-CHUNK = 20_000  # points at a time
-
-
-def convex_hull(points: np.ndarray) -> Surface:
-    """Vertices (maximum `MOST_VERTICES`) and outward faces of the convex hull of `points` (N, 3),
-    m.
-
-    Points in one plane, line or place get a hull that is 1 mm thick. Raises ValueError if there is
-    no hull.
-    """
-    if len(points) > MANY_POINTS:
-        points = points[_extremes(points)]
-    points = np.unique(points, axis=0)
-    size = math.dist(points.min(axis=0), points.max(axis=0))
-    thickness = max(THICKNESS, THICKNESS_RATIO * size)
-    for axis in _thin_axes(points, THIN_RATIO * size):
-        points = np.concatenate([points - thickness / 2 * axis, points + thickness / 2 * axis])
-    chosen, faces = _qhull(points)
-    if len(chosen) > MOST_VERTICES:
-        points = points[chosen][_extremes(points[chosen])]
-        chosen, faces = _qhull(points)
-    return points[chosen], faces
-
-
-def _qhull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The indices of the points that are vertices, and the faces as indices into these. Raises
-    ValueError.
-    """
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        hull = ConvexHull(_unit(points))
-    except QhullError as error:
-        raise ValueError(f"has no convex hull: {str(error).partition(chr(10))[0]}") from None
-    chosen = np.sort(hull.vertices)
-    corners = _unit(points)[hull.simplices]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = (normals * hull.equations[:, :3]).sum(axis=1) < 0
-    faces = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
-    return chosen, np.searchsorted(chosen, faces)
-
-
-def _unit(points: np.ndarray) -> np.ndarray:
-    """`points` stretched to the cube from -1 to 1, which suits Qhull's tolerances; a hull stays a
-    hull.
-    """
-    low = points.min(axis=0)
-    high = points.max(axis=0)
-    half = np.where(high > low, (high - low) / 2, 1.0)
-    return np.asarray((points - (low + high) / 2) / half)
-
-
-def _extremes(points: np.ndarray) -> np.ndarray:
-    """Indices of the extreme points in `MOST_VERTICES` directions: a spiral on the sphere, and the
-    axes, for the bounding box.
-    """
-    points = _unit(points)
-    directions: list[Vector] = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
-    turn = math.pi * (3 - math.sqrt(5))
-    rest = MOST_VERTICES - len(directions)
-    for number in range(rest):
-        height = 1 - (2 * number + 1) / rest
-        ring = math.sqrt(1 - height * height)
-        directions.append((ring * math.cos(turn * number), ring * math.sin(turn * number), height))
-    best = [-math.inf] * len(directions)
-    places = [0] * len(directions)
-    # In chunks that stay in the processor's cache.
-    for start in range(0, len(points), CHUNK):
-        chunk = np.asfortranarray(points[start : start + CHUNK])
-        for number, direction in enumerate(directions):
-            along = _along(chunk, direction)
-            place = int(along.argmax())
-            if along[place] > best[number]:
-                best[number] = float(along[place])
-                places[number] = start + place
-    return np.unique(places)
-
-
-def _thin_axes(points: np.ndarray, limit: float) -> list[np.ndarray]:
-    """Perpendicular unit vectors along which the extent of `points` is `limit` at most, m.
-
-    Found from successive farthest points, not by a decomposition: sums over all points may differ
-    between machines.
-    """
-    start = points[_length(points - points[0]).argmax()]
-    offsets = points - start
-    lengths = _length(offsets)
-    if lengths.max() <= limit:
-        return list(np.eye(3))
-    along = offsets[lengths.argmax()] / lengths.max()
-    aside = offsets - _along(offsets, along)[:, None] * along
-    widths = _length(aside)
-    if widths.max() <= limit:
-        first = np.cross(along, np.eye(3)[np.abs(along).argmin()])
-        first /= math.sqrt((first * first).sum())
-        return [first, np.cross(along, first)]
-    normal = np.cross(along, aside[widths.argmax()] / widths.max())
-    normal /= math.sqrt((normal * normal).sum())
-    heights = _along(offsets, normal)
-    if heights.max() - heights.min() <= limit:
-        return [normal]
-    return []
-
-
-def _along(points: np.ndarray, direction: np.ndarray | Vector) -> np.ndarray:
-    # Without BLAS, whose sums may differ between machines.
-    return np.asarray(
-        points[:, 0] * direction[0] + points[:, 1] * direction[1] + points[:, 2] * direction[2]
-    )
-
-
-def _length(offsets: np.ndarray) -> np.ndarray:
-    return np.asarray(np.sqrt(offsets[:, 0] ** 2 + offsets[:, 1] ** 2 + offsets[:, 2] ** 2))

@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.world.files.boxes import volume
-from ddenv.world.files.meshes import Surface, convex_hull
+from ddenv.world.hull import Surface, convex_hull
 from ddenv.world.model import Mesh
 
 # A piece that leaves at most this share of its hull empty is that hull.

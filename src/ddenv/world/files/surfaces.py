@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from ddenv.world.access import Unusable
 from ddenv.world.files.heights import pack_heights
-from ddenv.world.files.meshes import Surface
+from ddenv.world.hull import Surface
 from ddenv.world.terrain import bilinear
 
 LARGE = 8.0  # m along both sides

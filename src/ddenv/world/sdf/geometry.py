@@ -12,10 +12,10 @@ import numpy as np
 from ddenv.arrays import Floats
 from ddenv.text import Names
 from ddenv.world.access import Missing, Unusable
-from ddenv.world.extent import circle, convex_hull, polygon_area
+from ddenv.world.extent import circle, polygon_area
 from ddenv.world.files.boxes import box_of
-from ddenv.world.files.meshes import convex_hull as hull
 from ddenv.world.files.resources import MeshPart
+from ddenv.world.hull import convex_hull, convex_outline
 from ddenv.world.model import (
     UNCUT,
     Box,
@@ -380,7 +380,7 @@ def _polyline(geometry: Element, context: Context, scale: Vector) -> Placed:
     outlines = [
         np.array([numbers(point, 2) for point in element.findall("point")]) for element in elements
     ]
-    corners = convex_hull(np.vstack([outline.reshape(-1, 2) for outline in outlines]))
+    corners = convex_outline(np.vstack([outline.reshape(-1, 2) for outline in outlines]))
     if len(corners) < 3:
         raise complain(elements[0], "needs at least three <point>s that are not on one line")
     # Meshes of equal outlines compare equal.
@@ -401,7 +401,7 @@ def _polyline(geometry: Element, context: Context, scale: Vector) -> Placed:
     if is_convex or is_fine:
         low = np.column_stack([corners, np.zeros(len(corners))])
         try:
-            convex = Mesh(origin, *hull(np.vstack([low, low + np.array([0, 0, height])])))
+            convex = Mesh(origin, *convex_hull(np.vstack([low, low + np.array([0, 0, height])])))
         except ValueError as error:
             raise complain(elements[0], str(error)) from None
         return Placed(_scaled(convex, scale, elements[0]))
@@ -426,4 +426,6 @@ def _of_pieces(whole: Shape, pieces: list[Mesh]) -> Placed:
 def cone(radius: float, length: float) -> Mesh:
     """A cone centred on its frame's origin, its tip up, m."""
     rim = np.column_stack([radius * circle(SIDES), np.full(SIDES, -length / 2)])
-    return Mesh(f"cone {radius!r} {length!r}", *hull(np.vstack([rim, [0.0, 0.0, length / 2]])))
+    return Mesh(
+        f"cone {radius!r} {length!r}", *convex_hull(np.vstack([rim, [0.0, 0.0, length / 2]]))
+    )
