@@ -2,6 +2,10 @@
 
 import ast
 import re
+import tomllib
+from itertools import chain
+
+from packaging.requirements import Requirement
 
 from tests.command import loaded
 from tests.conftest import ROOT
@@ -60,3 +64,17 @@ def test_dataclasses_with_many_fields_are_made_with_names():
             ]
             if "dataclass" in made and len(fields) > 4:
                 assert "kw_only=True" in made, f"{path}: {node.name}"
+
+
+def test_the_lock_is_of_the_dependencies_that_are_declared_and_of_pypi():
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    locked = tomllib.loads((ROOT / "uv.lock").read_text())
+    asked = list(chain(declared["dependencies"], *declared["optional-dependencies"].values()))
+    (own,) = (each for each in locked["package"] if each["name"] == declared["name"])
+    wanted = {(each.name, each.specifier) for each in map(Requirement, asked)}
+    assert wanted == {
+        (each["name"], Requirement("any" + each.get("specifier", "")).specifier)
+        for each in own["metadata"]["requires-dist"]
+    }, "uv lock"
+    registries = {each["source"].get("registry") for each in locked["package"]}
+    assert registries == {"https://pypi.org/simple", None}

@@ -24,8 +24,15 @@ settings.register_profile(
 # The examples are always the same: what fails here fails again, and a change is judged by what it
 # changes.
 settings.register_profile("thorough", settings.get_profile("quick"), max_examples=40)
-# New examples each time: finds what the others miss.
-settings.register_profile("random", settings.get_profile("thorough"), derandomize=False)
+# New examples each time: finds what the others miss. What fails is printed so that it can be tried
+# again elsewhere.
+settings.register_profile(
+    "nightly",
+    settings.get_profile("thorough"),
+    derandomize=False,
+    max_examples=100,
+    print_blob=True,
+)
 
 
 def slow(mark: pytest.MarkDecorator, values: Iterable, *, but: Iterable = ()) -> list:

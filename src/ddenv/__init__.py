@@ -37,9 +37,12 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    # The command line and the screens begin fast because nothing numerical is imported for them.
-    for home, names in _HOMES.items():
-        if name in names:
-            return getattr(import_module(home), name)
-    raise AttributeError(f"module 'ddenv' has no attribute '{name}'")
+if not TYPE_CHECKING:
+    # A type checker knows these names from above, and reports any other.
+    def __getattr__(name: str) -> Any:
+        # The command line and the screens begin fast because nothing numerical is imported for
+        # them.
+        for home, names in _HOMES.items():
+            if name in names:
+                return getattr(import_module(home), name)
+        raise AttributeError(f"module 'ddenv' has no attribute '{name}'")

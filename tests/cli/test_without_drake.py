@@ -1,5 +1,5 @@
 """Where Drake has no wheels, what needs it says so in one line, and all that only looks works.
-Windows lacks more than Drake.
+Windows lacks more than Drake. What needs an extra names it.
 """
 
 import os
@@ -7,16 +7,17 @@ import os
 import pytest
 
 from ddenv.learn.catalog import LESSONS
-from tests.command import ddenv
+from tests.command import ddenv, is_one_line
 from tests.conftest import DATA
 from tests.tiers import slow
 
+RUN = LESSONS / "ditch.ddenv"
 COMMANDS = {
     "run": ["run", DATA / "wall.yaml"],
     "test": ["test", DATA / "wall.yaml"],
     "settle": ["world", "settle", DATA / "wall.sdf", "-o", "settled.sdf"],
+    "mcap": ["export", RUN, "--mcap", "ditch.mcap"],
 }
-RUN = LESSONS / "ditch.ddenv"
 LOOKS = {
     "learn": (["learn", "--list"], "7  Groups"),
     "page": (["learn", "5", "--page", "five.html"], "wrote five.html"),
@@ -47,3 +48,9 @@ def test_what_needs_drake_says_so(home, name):
     last = done.stderr.strip().splitlines()[-1]
     assert "Drake, which is not installed here: pip install drake" in last
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.programs
+def test_messages_need_an_extra_and_say_which(home):
+    done = without(home, ("mcap_ros2",), COMMANDS["mcap"])
+    is_one_line(done, "--mcap needs another package: pip install '.[mcap]'")

@@ -152,12 +152,16 @@ def export_command(
 
 
 def _write_mcap(run: Path, file: Path, trust: bool) -> None:
-    from ddenv.engine.mcap_file import write_mcap
     from ddenv.robot import check_drake
     from ddenv.runfile.store import RunFile
+    from ddenv.runs.programs import how_to_install
     from ddenv.runs.trust import trusted_scenario
 
     check_drake()
+    try:
+        from ddenv.engine.mcap_file import write_mcap
+    except ModuleNotFoundError:
+        raise UserError(f"--mcap needs another package: {how_to_install('mcap')}") from None
     with RunFile(run) as opened:
         trusted_scenario(opened, asking(trust))
     announce(f"repeating runs of {run.stem} ...")

@@ -69,7 +69,7 @@ def _places(population: Element) -> list[Vector]:
         size = step * np.subtract(counts, 1)
     else:
         step = size / counts
-    first = np.where(given, 0, size / 2)
+    first = np.where([path != "" for path in given], 0, size / 2)
     indices = [index[::-1] for index in np.ndindex(*reversed(counts))]
     offsets = first + step * indices
     pose = pose_of(_child(population, "pose"))
