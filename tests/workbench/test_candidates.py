@@ -2,6 +2,7 @@
 into text.
 """
 
+from collections import defaultdict
 from dataclasses import replace
 
 import fake_moments
@@ -24,7 +25,8 @@ def snapshot(run, engine="alive") -> Snapshot:
 
 def rows_of(shown: Snapshot) -> list[dict[str, str]]:
     listing = listed(shown)
-    return [words(shown, listing, row) for row in range(len(listing))]
+    # A cell without words is not there.
+    return [defaultdict(str, words(shown, listing, row)) for row in range(len(listing))]
 
 
 def large(number: int, judged: int = 0) -> Snapshot:

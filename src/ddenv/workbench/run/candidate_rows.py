@@ -16,7 +16,7 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
-from ddenv.text import count, percent, percent_at_least, plain, told_apart
+from ddenv.text import Names, count, percent, percent_at_least, plain, told_apart
 from ddenv.words.claims import made_of_usual, short
 from ddenv.words.early_stop import early_among
 from ddenv.words.signs import (
@@ -177,30 +177,47 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
     done = [test for test in tests if test.is_finished]
     running = len(done) < len(tests) and any(test.outcome == "running" for test in tests)
     distances = [test.distance for test in done if test.distance is not None]
-    seconds = sum(test.wall_seconds for test in done)
-    candidate = item if isinstance(item, Candidate) else None
-    fallen = drops(snapshot.state, item)
-    dropped = f"drops {len(fallen)} models" if len(fallen) > 1 else dropping(fallen, NAME)
     ended = signs(Counter(test.outcome for test in done))
-    # More runs are made of what shows f until it is clear that it keeps the rate.
-    options = settings(snapshot.state)
-    # What has a verdict needs no more.
-    enough = options.accept_rate == "kept" or (item.verdict and len(done) < options.most_runs)
-    most = "" if enough else f"/{options.most_runs}"
-    return {
+    cells = {
         "environment": item.label,
-        "runs": str(len(done)) if done else "",
-        "ended": ended,
-        "#": str(candidate.index + 1) if candidate else "",
-        "candidate": f"{item.label}{DROPS}" if fallen else item.label,
+        "candidate": item.label,
         "models": str(item.size),
-        "distance": metres(candidate.distance) if candidate else "",
-        "tests": f"{len(done)}{most}" if done or running else "",
+        "ended": ended,
         "evidence": ended,
-        "to f": metres(min(distances)) if distances else "",
-        "real": brief(seconds) if done else "",
-        "verdict": _verdict(snapshot, item, tests) or dropped,
+        "verdict": _verdict(snapshot, item, tests),
     }
+    if isinstance(item, Candidate):
+        cells["#"] = str(item.index + 1)
+        cells["distance"] = metres(item.distance)
+    if done or running:
+        cells["tests"] = f"{len(done)}{_most_runs(snapshot, item, len(done))}"
+    if done:
+        cells["runs"] = str(len(done))
+        cells["real"] = brief(sum(test.wall_seconds for test in done))
+    if distances:
+        cells["to f"] = metres(min(distances))
+    fallen = drops(snapshot.state, item)
+    if fallen:
+        cells["candidate"] += DROPS
+        cells["verdict"] = cells["verdict"] or _dropped(fallen)
+    return cells
+
+
+def _most_runs(snapshot: Snapshot, item: Trial | Candidate, done: int) -> str:
+    """How many runs are made at most, where that is known: what shows f is run until it is clear
+    that it keeps the rate, and what has a verdict is run no more.
+    """
+    options = settings(snapshot.state)
+    is_decided = item.verdict and done < options.most_runs
+    if options.accept_rate == "kept" or is_decided:
+        return ""
+    return f"/{options.most_runs}"
+
+
+def _dropped(fallen: Names) -> str:
+    if len(fallen) > 1:
+        return f"drops {len(fallen)} models"
+    return dropping(fallen, NAME)
 
 
 def _verdict(snapshot: Snapshot, item: Trial | Candidate, tests: Sequence[Test]) -> str:
@@ -239,14 +256,17 @@ def _environment(one: FreshRuns, listing: Listed) -> str:
 
 
 def _certificate_words(snapshot: Snapshot, one: FreshRuns, listing: Listed) -> Words:
-    return {
+    cells = {
         "environment": _environment(one, listing),
-        "runs": str(one.runs) if one.runs else "",
         "ended": signs(dict(one.outcomes)),
-        "f": percent(one.shown / one.runs) if one.runs and not one.is_chosen else "",
         "shown": one.shows_at_least,
         "verdict": _claim(snapshot, one),
     }
+    if one.runs:
+        cells["runs"] = str(one.runs)
+    if one.runs and not one.is_chosen:
+        cells["f"] = percent(one.shown / one.runs)
+    return cells
 
 
 def _claim(snapshot: Snapshot, one: FreshRuns) -> str:

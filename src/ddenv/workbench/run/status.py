@@ -48,6 +48,20 @@ STEP = 5
 
 # What the status line says, by name, from the longest form to the shortest.
 Facts = dict[str, Sentences]
+# From left to right.
+ORDER = (
+    "state",
+    "way back",
+    "asked",
+    "tests",
+    "drift",
+    "cut",
+    "time",
+    "left",
+    "mode",
+    "engine",
+    "scene",
+)
 
 
 class Header(Widget):
@@ -132,7 +146,7 @@ class Status(Widget):
             return Style(link=self._besides[0], underline=True)
         if name == "drift" and self._snapshot is not None and has_dropped(self._snapshot.state):
             return ink(self.app.theme_variables, "text-warning", bold=True)
-        return Style(dim=name in ("time", "left", "mode", "cut"))
+        return Style(dim=name in ("time", "left", "mode", "way back", "cut"))
 
 
 def heading(state: RunState) -> tuple[Sentences, Sentences]:
@@ -177,47 +191,70 @@ def branch_of(state: RunState) -> int | None:
 
 def facts(snapshot: Snapshot, scene: str = "", asked: str = "") -> Facts:
     state = snapshot.state
-    status = "certifying" if snapshot.status == "running" and state.confirming else snapshot.status
-    status = "isolating" if snapshot.status == "running" and state.isolating is not None else status
-    status = "margins" if status == "running" and state.margining is not None else status
-    status = "settling" if status == "baseline" and state.settling else status
-    (sign, word) = STATUS.get(status, ("·", status))
-    way_on = ""
-    if snapshot.gone:
-        sign = "✗"
-        word = "the run file is gone"
-    elif status == "lost":
-        way_on = ": r resumes"
-    elif state.needs_room and not state.ended:
-        sign = "!"
-        word = "file too large" if state.file_is_full else "out of disk space"
-    return {
-        "state": (f"{sign} {word}{way_on}", f"{sign} {word}"),
-        "asked": (f"… {asked}", "…") if asked else (),
+    said: Facts = {
+        "state": _state_said(snapshot),
         "tests": tests_said(state),
         "drift": drift_said(state),
-        "cut": (f"{cut} ended early", "") if (cut := state.cut_tests) else (),
-        "time": (duration(snapshot.spent), "") if snapshot.spent else (),
         "left": left_said(state, snapshot.engine == "alive"),
-        "mode": ("accept: ask", "") if state.accept_mode == "ask" and not state.ended else (),
         "engine": engine_said(snapshot),
-        "scene": (f"scene {scene}", "scene") if scene else (),
     }
+    if asked:
+        said["asked"] = (f"… {asked}", "…")
+    if state.cut_tests:
+        said["cut"] = (f"{state.cut_tests} ended early", "")
+    if snapshot.spent:
+        said["time"] = (duration(snapshot.spent), "")
+    if state.accept_mode == "ask" and not state.ended:
+        said["mode"] = ("accept: ask", "")
+    if scene:
+        said["scene"] = (f"scene {scene}", "scene")
+    return said
+
+
+def _state_said(snapshot: Snapshot) -> tuple[str, ...]:
+    if snapshot.gone:
+        return ("✗ the run file is gone",)
+    state = snapshot.state
+    status = _status(snapshot)
+    (sign, word) = STATUS.get(status, ("·", status))
+    if status == "lost":
+        return (f"{sign} {word}: r resumes", f"{sign} {word}")
+    if state.needs_room and not state.ended:
+        return ("! file too large" if state.file_is_full else "! out of disk space",)
+    return (f"{sign} {word}",)
+
+
+def _status(snapshot: Snapshot) -> str:
+    """The status, with what is done in it."""
+    state = snapshot.state
+    match snapshot.status:
+        case "running" if state.isolating is not None:
+            return "isolating"
+        case "running" if state.confirming:
+            return "certifying"
+        case "running" if state.margining is not None:
+            return "margins"
+        case "baseline" if state.settling:
+            return "settling"
+    return snapshot.status
 
 
 def facts_of_past(snapshot: Snapshot, scene: str, moment: int, moments: int) -> Facts:
-    return {
+    said: Facts = {
         "state": (f"◂ moment {moment} of {moments}",),
-        "mode": ("escape: now",),
+        "way back": ("escape: now",),
         "tests": tests_said(snapshot.state),
-        "time": (duration(snapshot.spent), "") if snapshot.spent else (),
-        "left": ("scene shows it", "") if scene else (),
     }
+    if snapshot.spent:
+        said["time"] = (duration(snapshot.spent), "")
+    if scene:
+        said["left"] = ("scene shows it", "")
+    return said
 
 
 def fitted(said: Facts, width: int) -> list[tuple[str, str]]:
     """(name, words) of what fits into `width` cells."""
-    forms = {name: list(each) for name, each in said.items() if each}
+    forms = {name: list(said[name]) for name in ORDER if said.get(name)}
     for name in SHRINK:
         if sum(len(each[0]) + 3 for each in forms.values() if each[0]) <= width:
             break
