@@ -6,7 +6,6 @@ import shlex
 from pathlib import Path
 
 from ddenv.evidence.claims import (
-    FreshRuns,
     current,
     fresh_runs,
     helping,
@@ -16,7 +15,7 @@ from ddenv.evidence.claims import (
 )
 from ddenv.evidence.rates import wilson_interval
 from ddenv.evidence.slices import simulated
-from ddenv.runfile.progress import Node
+from ddenv.runfile.progress import Claim, Node
 from ddenv.runfile.state import RunState, spent
 from ddenv.runs.folder import attach_name
 from ddenv.text import Data, count, first_of, percent, printable
@@ -28,6 +27,7 @@ from ddenv.words.claims import (
     promise,
     rate,
     seen,
+    shows,
     smaller_known,
     verdict_on,
     what_ran,
@@ -108,23 +108,23 @@ def certificate(state: RunState) -> Data | None:
         "never_left_out": never_left_out(state, found),
         "means": promise(state, found) if is_minimal(found) else verdict_on(found),
         "claims": claims,
-        "whole_world": None
-        if whole is None
-        else _share(whole.shown, whole.runs)
-        | {"low": whole.low, "high": whole.high, "outcomes": dict(whole.outcomes)},
+        "whole_world": None if whole is None else _rate_of(whole),
     }
 
 
-def _whole_world(state: RunState) -> FreshRuns | None:
+def _rate_of(claim: Claim) -> Data:
+    interval = {"low": claim.low, "high": claim.high}
+    return {**_share(claim.shown, claim.runs), **interval, "outcomes": dict(claim.outcomes)}
+
+
+def _whole_world(state: RunState) -> Claim | None:
     """The certificate's runs of the whole world, if it made any with all seeds of those of what is
     left.
     """
-    runs = (
-        each
-        for each in fresh_runs(state)
-        if each.node == 0 and not each.is_left and not each.is_chosen
-    )
-    return next((each for each in runs if each.runs), None)
+    for each in fresh_runs(state):
+        if each.node == 0 and not each.is_left and each.has_rate:
+            return each.claim
+    return None
 
 
 def summary_lines(state: RunState, path: Path) -> list[str]:
@@ -195,10 +195,13 @@ def _certificate_lines(state: RunState) -> list[str]:
     found = current(state)
     if found is None:
         rates = drift(state) or (f"f in {seen(state.nodes[0])} in the whole world",)
-        rows = [one for one in fresh_runs(state) if one.shows]
+        rows = [one for one in fresh_runs(state) if shows(one.claim)]
         return [
             f"{rates[0]}; {missing(state)}",
-            *(f"  {what_ran(one)}: {rate(one)}: {one.shows}" for one in rows[:MOST_NAMES]),
+            *(
+                f"  {what_ran(one)}: {rate(one.claim)}: {shows(one.claim)}"
+                for one in rows[:MOST_NAMES]
+            ),
         ]
     left, *removals = found.claims
     lines = [f"  what is left: {rate(left)}: {meaning(left, found)}"]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
 from statistics import median
 
 from ddenv.environment import Environment
@@ -29,7 +30,7 @@ from ddenv.runfile.progress import Certificate, Claim, Isolation
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, CERTIFY, OUTCOMES, RunState, Test
 from ddenv.runfile.supports import stack_with, stacks_of
-from ddenv.text import Names, percent_at_least, percent_at_most
+from ddenv.text import Names
 
 # After so many pairs without a model, what a certificate still takes is forecast from what it has
 # seen.
@@ -260,48 +261,28 @@ def has_dropped(state: RunState) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreshRuns:
-    """Runs with fresh seeds of the environment of `node`, or of that without the model `without`.
+    """Runs with fresh seeds of the environment of `node`, and the `claim` that they make: its
+    verdict is "" while they are being made.
 
-    `shown` of the `runs` that ended and did not break showed f; `outcomes` has the number of each
-    outcome. `low`..`high` is the 95 % interval of the rate, 0..1 without runs. `running` are the
-    tests that run now. `claim` is what the finished certificate says of them. What is left keeps at
-    least `bound` of the rate, by the runs so far; without the model f shows at most `bound` times
-    as often. `is_left`: all that is left ran. `is_chosen`: the whole world ran only where what is
-    left missed f, so these runs say nothing about its rate.
+    `running` are the tests that run now. `is_left`: all that is left ran. `is_chosen`: the whole
+    world ran only where what is left missed f, so these runs say nothing about its rate.
     """
 
     node: int
-    without: str | None
-    shown: int
-    runs: int
-    low: float
-    high: float
-    outcomes: tuple[tuple[str, int], ...]
+    claim: Claim
     running: tuple[Test, ...] = ()
-    claim: Claim | None = None
     is_left: bool = False
-    bound: float | None = None
     is_chosen: bool = False
 
     @property
-    def shows_at_least(self) -> str:
-        """That "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing
-        is shown yet.
-        """
-        if self.bound is None or (self.bound >= 1.0 if self.without else self.bound <= 0.0):
-            return ""
-        if self.without:
-            return f"≤ {percent_at_most(self.bound)}"
-        return f"≥ {percent_at_least(self.bound)}"
+    def without(self) -> str | None:
+        """The model that is left out."""
+        return self.claim.without
 
     @property
-    def shows(self) -> str:
-        """The same in words."""
-        if self.bound is None or not self.shows_at_least:
-            return ""
-        if self.without:
-            return f"at most {percent_at_most(self.bound)} as often"
-        return f"keeps at least {percent_at_least(self.bound)} of the rate"
+    def has_rate(self) -> bool:
+        """Whether the runs say how often f shows."""
+        return self.claim.runs > 0 and not self.is_chosen
 
 
 def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
@@ -311,70 +292,73 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
     certificate = state.certificate
     if certificate is None:
         return ()
-    tests: dict[tuple[int, str | None], list[Test]] = {}
-    for test in (each for each in state.confirm_tests if each.run >= certificate.first_run):
-        tests.setdefault((test.node, test.without), []).append(test)
-    claims = {claim.without: claim for claim in certificate.claims}
-    # Stacks that are kept together are named by their first models. Where the rate is lost, nothing
-    # is claimed of removals.
-    free = (
-        stack[0] for stack in stacks_of(state, state.environment) if state.pinned.isdisjoint(stack)
-    )
-    removals = [name for name in free if name in claims or not (claims or certificate.seeds)]
-    keys = [(certificate.node, None), *((certificate.node, name) for name in removals)]
+    tests: dict[_Key, list[Test]] = {}
+    for test in state.confirm_tests:
+        if test.run >= certificate.first_run:
+            tests.setdefault((test.node, test.without), []).append(test)
+    claims = {(certificate.node, claim.without): claim for claim in certificate.claims}
+    bounds: dict[_Key, float | None] = {}
+    if not claims:
+        for without, claim in so_far(state, certificate).items():
+            bounds[certificate.node, without] = claim.bound
     first = origin(state, certificate.node).number
-    earlier = sorted(
-        (key for key in tests if key not in keys and key != (first, None)), key=lambda key: -key[0]
-    )
-    keys += earlier
-    # A finished certificate need not have run the whole world.
-    if certificate.node != first and (not (claims or certificate.seeds) or (first, None) in tests):
-        keys.append((first, None))
-    found = []
-    for node, without in keys:
-        of = tests.get((node, without), [])
-        running = tuple(test for test in of if test.outcome == "running")
-        claim = claims.get(without) if node == certificate.node else None
-        if claim is not None:
-            runs_of_claim = FreshRuns(
-                node=node,
-                without=without,
-                shown=claim.shown,
-                runs=claim.runs,
-                low=claim.low,
-                high=claim.high,
-                outcomes=claim.outcomes,
-                running=running,
-                claim=claim,
-                bound=claim.bound,
-            )
-            found.append(runs_of_claim)
-            continue
-        counts = Counter(test.outcome for test in of if test.is_finished)
-        outcomes = tuple((outcome, counts[outcome]) for outcome in OUTCOMES if counts[outcome])
-        runs = counts.total() - sum(counts[outcome] for outcome in BROKEN)
-        shown = counts["similar"]
-        low, high = anytime_interval(shown, runs)
-        undecided = FreshRuns(
+    left_runs = {test.run for test in tests.get((certificate.node, None), [])}
+    whole_runs = {test.run for test in tests.get((first, None), [])}
+    found: list[FreshRuns] = []
+    for key in _environments_run(state, certificate, first, tests):
+        node, without = key
+        made = tests.get(key, [])
+        runs = FreshRuns(
             node=node,
-            without=without,
-            shown=shown,
-            runs=runs,
-            low=low,
-            high=high,
-            outcomes=outcomes,
-            running=running,
+            claim=claims.get(key) or _open_claim(without, made, bounds.get(key)),
+            running=tuple(test for test in made if test.outcome == "running"),
+            is_left=not found,
+            is_chosen=node == first != certificate.node and whole_runs < left_runs,
         )
-        found.append(undecided)
-    if claims:
-        bounds = {}
-    else:
-        bounds = {without: claim.bound for without, claim in so_far(state, certificate).items()}
-    left_runs, whole_runs = (
-        {test.run for test in tests.get((node, None), [])} for node in (certificate.node, first)
-    )
-    for place, one in enumerate(found):
-        bound = one.bound if one.claim or one.node != certificate.node else bounds.get(one.without)
-        is_chosen = one.node == first != certificate.node and whole_runs < left_runs
-        found[place] = replace(one, is_left=place == 0, bound=bound, is_chosen=is_chosen)
+        found.append(runs)
     return tuple(found)
+
+
+# The node of an environment, and the model that is left out of it.
+_Key = tuple[int, str | None]
+
+
+def _environments_run(
+    state: RunState, certificate: Certificate, first: int, tests: Collection[_Key]
+) -> Iterator[_Key]:
+    """What is left, that without each model, earlier environments, and the world of node `first`.
+
+    Stacks that are kept together are named by their first models. Where the rate is lost, nothing
+    is claimed of removals.
+    """
+    is_open = not (certificate.claims or certificate.seeds)
+    claimed = {claim.without for claim in certificate.claims}
+    whole = (first, None)
+    keys: list[_Key] = [(certificate.node, None)]
+    for name, *others in stacks_of(state, state.environment):
+        if state.pinned.isdisjoint((name, *others)) and (is_open or name in claimed):
+            keys.append((certificate.node, name))
+    yield from keys
+    earlier = [key for key in tests if key not in keys and key != whole]
+    yield from sorted(earlier, key=lambda key: -key[0])
+    # A finished certificate need not have run the whole world.
+    if certificate.node != first and (is_open or whole in tests):
+        yield whole
+
+
+def _open_claim(without: str | None, tests: Sequence[Test], bound: float | None) -> Claim:
+    """What the finished ones of these tests show so far."""
+    counts = Counter(test.outcome for test in tests if test.is_finished)
+    shown = counts["similar"]
+    runs = counts.total() - sum(counts[outcome] for outcome in BROKEN)
+    low, high = anytime_interval(shown, runs)
+    return Claim(
+        without=without,
+        verdict="",
+        shown=shown,
+        runs=runs,
+        low=low,
+        high=high,
+        outcomes=tuple((outcome, counts[outcome]) for outcome in OUTCOMES if counts[outcome]),
+        bound=bound,
+    )

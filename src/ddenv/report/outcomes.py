@@ -27,7 +27,7 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.text import as_sentence, count, plain
 from ddenv.words.baseline import failed_in, missed
-from ddenv.words.claims import drift, means, missing, promise
+from ddenv.words.claims import drift, means, missing, promise, shows
 from ddenv.words.early_stop import WHY, why_off
 from ddenv.words.slices import TEACHING, refuted_words, slice_words
 
@@ -221,7 +221,7 @@ def worth(record: Record) -> Section | None:
     if state.baseline is None or not state.nodes:
         return None
     found = current(state)
-    rows = [each for each in fresh_runs(state)[:MOST_ROWS] if each.shows]
+    rows = [each for each in fresh_runs(state)[:MOST_ROWS] if shows(each.claim)]
     if found is not None:
         return Section("What the result is worth", tuple(_with(state, found)))
     if rows:
@@ -233,7 +233,13 @@ def worth(record: Record) -> Section | None:
     blocks: list[Block] = [say(first, f" From all runs so far: {so_far[0]}." if so_far else "")]
     if rows:
         shown = [
-            (_name(each), thousands(each.runs), thousands(each.shown), each.shows) for each in rows
+            (
+                _name(each),
+                thousands(each.claim.runs),
+                thousands(each.claim.shown),
+                shows(each.claim),
+            )
+            for each in rows
         ]
         blocks.append(Table(("environment", "runs", "with f", "shown"), shown, {1, 2}))
     return Section("What the result is worth", tuple(blocks))
@@ -243,16 +249,16 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
     head = ("environment", "runs", "ended", "f shown", "95 % interval", "meaning")
     rows = []
     for each in fresh_runs(state)[:MOST_ROWS]:
-        ended = ", ".join(f"{number} {outcome}" for outcome, number in each.outcomes)
-        has_rate = each.runs and not each.is_chosen
-        shown = percent(each.shown / each.runs) if has_rate else "–"
-        is_exact = each.claim is not None and each.claim.is_exact
-        if has_rate and not is_exact:
-            interval = f"{percent(each.low)} to {percent(each.high)}"
-        else:
-            interval = "–"
-        meaning = each.shows if each.claim is None else means(state, found, each.claim)
-        rows.append((_name(each), thousands(each.runs), ended, shown, interval, meaning))
+        claim = each.claim
+        ended = ", ".join(f"{number} {outcome}" for outcome, number in claim.outcomes)
+        shown = "–"
+        interval = "–"
+        if each.has_rate:
+            shown = percent(claim.shown / claim.runs)
+        if each.has_rate and not (claim.verdict and claim.is_exact):
+            interval = f"{percent(claim.low)} to {percent(claim.high)}"
+        meaning = means(state, found, claim) if claim.verdict else shows(claim)
+        rows.append((_name(each), thousands(claim.runs), ended, shown, interval, meaning))
     words = (
         "These runs have seeds that the search did not use, and none of them ended early. Rates "
         "exclude broken runs."

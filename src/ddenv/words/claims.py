@@ -229,14 +229,34 @@ def what_ran(one: FreshRuns) -> str:
     return environment_named(one.node)
 
 
-def rate(fresh: Claim | FreshRuns) -> str:
+def bound_sign(claim: Claim) -> str:
+    """That "≥ 63 %" of the rate is kept, or "≤ 21 %" as often without the model; "" if nothing is
+    shown yet.
+    """
+    if claim.bound is None:
+        return ""
+    if claim.without is not None:
+        return f"≤ {percent_at_most(claim.bound)}" if claim.bound < 1.0 else ""
+    return f"≥ {percent_at_least(claim.bound)}" if claim.bound > 0.0 else ""
+
+
+def shows(claim: Claim) -> str:
+    """The same in words."""
+    if claim.bound is None or not bound_sign(claim):
+        return ""
+    if claim.without is not None:
+        return f"at most {percent_at_most(claim.bound)} as often"
+    return f"keeps at least {percent_at_least(claim.bound)} of the rate"
+
+
+def rate(fresh: Claim) -> str:
     """How often fresh runs showed f: "f in 23 of 23 fresh runs (86 % to 100 %)"; without an
     interval, how often chosen ones did.
     """
     return f"f in {_share(fresh.shown, fresh)}"
 
 
-def _share(number: int, one: Claim | FreshRuns | Returned) -> str:
+def _share(number: int, one: Claim | Returned) -> str:
     if one.low == one.high:
         return f"{number} of {count(one.runs, 'chosen run')}"
     interval = f" ({percent(one.low)} to {percent(one.high)})" if one.runs else ""

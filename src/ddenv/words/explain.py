@@ -596,7 +596,7 @@ def _certifying(snapshot: Snapshot) -> Sentences:
     done = f"{made} {'is' if made == 1 else 'are'} done"
     rows = fresh_runs(state)
     aim = certificate.certify_rate
-    shown = rows[0].bound or 0.0 if rows else 0.0
+    shown = (rows[0].claim.bound or 0.0) if rows else 0.0
     kept = f"at least {percent_at_least(shown)} is kept" if shown else "nothing is shown yet"
     return (
         *(() if certificate.seeds else (f"{bar(shown, aim)} {kept}, aim {percent(aim)}",)),
@@ -611,13 +611,14 @@ def _certifying(snapshot: Snapshot) -> Sentences:
 
 
 def _so_far(rows: Sequence[FreshRuns]) -> Sentences:
-    if not rows or not rows[0].runs:
+    if not rows or not rows[0].claim.runs:
         return ()
-    left = rows[0]
-    whole = rows[-1]
+    left = rows[0].claim
+    last = rows[-1]
     beside = ""
-    if whole.without is None and whole.runs and len(rows) > 1 and not whole.is_chosen:
-        beside = f", and in {of_runs(whole.shown, whole.runs)} of {environment_named(whole.node)}"
+    if last.without is None and last.has_rate and len(rows) > 1:
+        whole = of_runs(last.claim.shown, last.claim.runs)
+        beside = f", and in {whole} of {environment_named(last.node)}"
     return (f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",)
 
 

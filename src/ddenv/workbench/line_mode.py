@@ -89,7 +89,8 @@ def table(snapshot: Snapshot) -> Iterator[str]:
         yield _said_of(state, trial)
     if state.certificate is not None:
         for fresh in fresh_runs(state):
-            yield f"{plain(what_ran(fresh))}: f in {fresh.shown} of {count(fresh.runs, 'run')}"
+            runs = count(fresh.claim.runs, "run")
+            yield f"{plain(what_ran(fresh))}: f in {fresh.claim.shown} of {runs}"
     elif state.round is not None:
         yield from (_said_of(state, candidate) for candidate in state.round.candidates)
     else:

@@ -17,7 +17,7 @@ from ddenv.runfile.snapshot import Snapshot
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
 from ddenv.text import Names, count, percent, percent_at_least, plain, told_apart
-from ddenv.words.claims import made_of_usual, short
+from ddenv.words.claims import bound_sign, made_of_usual, short
 from ddenv.words.early_stop import early_among
 from ddenv.words.signs import (
     CLAIM,
@@ -114,12 +114,12 @@ def round_title(state: RunState) -> tuple[str, str]:
         number = f" {certificate.number}" if certificate.number > 1 else ""
         rows = fresh_runs(state)
         aim = percent_at_least(certificate.certify_rate)
-        if rows[0].shows_at_least:
-            keeps = f"keeps {rows[0].shows_at_least}, aim {aim}"
+        if bound := bound_sign(rows[0].claim):
+            keeps = f"keeps {bound}, aim {aim}"
         else:
             keeps = f"has to show {aim}"
         keeps = "chosen seeds" if certificate.seeds else keeps
-        made = sum(one.runs for one in rows)
+        made = sum(one.claim.runs for one in rows)
         far = made_of_usual(state, certificate) if in_the_making(state) else count(made, "run")
         return f"Certificate{number}: {keeps}", far
     if state.round is None:
@@ -258,20 +258,20 @@ def _environment(one: FreshRuns, listing: Listed) -> str:
 def _certificate_words(snapshot: Snapshot, one: FreshRuns, listing: Listed) -> Words:
     cells = {
         "environment": _environment(one, listing),
-        "ended": signs(dict(one.outcomes)),
-        "shown": one.shows_at_least,
+        "ended": signs(dict(one.claim.outcomes)),
+        "shown": bound_sign(one.claim),
         "verdict": _claim(snapshot, one),
     }
-    if one.runs:
-        cells["runs"] = str(one.runs)
-    if one.runs and not one.is_chosen:
-        cells["f"] = percent(one.shown / one.runs)
+    if one.claim.runs:
+        cells["runs"] = str(one.claim.runs)
+    if one.has_rate:
+        cells["f"] = percent(one.claim.shown / one.claim.runs)
     return cells
 
 
 def _claim(snapshot: Snapshot, one: FreshRuns) -> str:
     """The verdict of a claim, and how the robot fails without a needed model."""
-    if one.claim is None:
+    if not one.claim.verdict:
         return _running(snapshot, one.running)
     words = f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}"
     certificate = snapshot.state.certificate
