@@ -78,7 +78,7 @@ def decided(path):
         (test.environment, test.run) for test in state.finished_tests if test.outcome not in BROKEN
     ]
     assert len(made) == len(set(made)), "a test was made twice"
-    found.append(named(state.leg.tests))
+    found.append(named(state.search.tests))
     return found, state
 
 

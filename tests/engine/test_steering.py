@@ -29,11 +29,11 @@ def test_a_pinned_model_stays_and_is_part_of_every_candidate(tmp_path):
     assert set(state.environment) == {"wall", "ball"}
     assert state.minimal
     assert state.reason.endswith("; 1 pinned model was never left out")
-    leg = [event.id for event in events(path) if event.kind == "leg_started"][-1]
+    search = [event.id for event in events(path) if event.kind == "leg_started"][-1]
     started = [
         asdict(event.event)["test"]
         for event in events(path)
-        if event.kind == "test_started" and event.id > leg
+        if event.kind == "test_started" and event.id > search
     ]
     assert all("ball" in models_in(state, test) for test in started)
     assert [one.kind for one in state.decisions] == ["pin"]

@@ -408,7 +408,7 @@ def test_models_that_are_called_needed_beside_others_that_only_help_are_rarely_n
             keeps_rate=False,
         )
         driver = driving.Driver(ten)
-        made = driver.drive(certify(driver, driver.leg(), (ten.whole,)))
+        made = driver.drive(certify(driver, driver.search(), (ten.whole,)))
         _, *verdicts = (named.claim.verdict for named in made.claims)
         false += "needed" in verdicts and {*verdicts} <= {"needed", *HELPING}
     check(false, error_of(1), LONGER)

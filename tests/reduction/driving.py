@@ -15,8 +15,8 @@ from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.certificate import Terms, error_of
 from ddenv.evidence.rates import estimated_rate
 from ddenv.reduction.algorithms import tried_again
-from ddenv.reduction.guide import make_guide, search
-from ddenv.reduction.procedure import Baseline, Certificate, Changed, Leg, Past, Test
+from ddenv.reduction.guide import begin_search, make_guide
+from ddenv.reduction.procedure import Baseline, Certificate, Changed, Past, Search, Test
 from ddenv.reduction.round import Stacks
 from ddenv.reduction.verdict import Acceptance
 from tests.reduction.worlds import evidence
@@ -119,7 +119,7 @@ class Driver:
         self.made: list[Test] = []
         self.vetoed: set[Environment] = set()
         # Each search, with where it began and how many facts were before.
-        self.legs: list[tuple[Leg, Now, int]] = []
+        self.searches: list[tuple[Search, Now, int]] = []
         self._order, self._running = random.Random(order), []
         self._round = None
 
@@ -140,32 +140,36 @@ class Driver:
     def goes_on(self):
         return True
 
-    def algorithm(self, leg):
+    def algorithm(self, search):
         facts = evidence(len(self.world.labels), self.world.seed)
-        stacks = Stacks(leg.free)
+        stacks = Stacks(search.free)
 
         def broke(candidate):
-            environment = leg.pinned | Environment.of(stacks.expanded(candidate.models))
+            environment = search.pinned | Environment.of(stacks.expanded(candidate.models))
             return (self.now.round, environment) in self.known.unknown
 
         guide = make_guide(
             "timeseg",
             "failure-proximal",
             lambda: facts,
-            n_partitions=leg.n_partitions or 2,
+            n_partitions=search.n_partitions or 2,
             growth="steady",
             skip="implied",
-            rate=lambda: leg.rule.rate or 1.0,
-            runs=lambda: leg.rule.misses,
+            rate=lambda: search.rule.rate or 1.0,
+            runs=lambda: search.rule.misses,
             broke=broke,
-            proves=leg.rule.proves,
+            proves=search.rule.proves,
         )
-        inside = tuple(first for first, stack in stacks.by_first.items() if stack <= leg.chain[-1])
+        inside = tuple(
+            first for first, stack in stacks.by_first.items() if stack <= search.chain[-1]
+        )
         return stacks.expand(
-            tried_again(inside, leg.again, lambda left: search(self.world.algorithm, left, guide))
+            tried_again(
+                inside, search.again, lambda left: begin_search(self.world.algorithm, left, guide)
+            )
         )
 
-    def leg(self, again=()):
+    def search(self, again=()):
         """The next search, from what is left."""
         pinned = NOTHING if self.world.pinned is None else self.world.stack(self.world.pinned)
         labels = dict.fromkeys(self.world.labels)
@@ -183,7 +187,7 @@ class Driver:
             steps_back=len(self.now.lost),
         )
         n_partitions = self.now.n_partitions.get(self.now.chain[-1])
-        leg = Leg(
+        search = Search(
             first_round=self.now.round + 1,
             whole=self.world.whole,
             chain=self.now.chain,
@@ -193,10 +197,10 @@ class Driver:
             n_partitions=n_partitions,
             again=tuple(again),
         )
-        self.legs.append((leg, deepcopy(self.now), len(self.facts)))
-        return leg
+        self.searches.append((search, deepcopy(self.now), len(self.facts)))
+        return search
 
-    start_search = leg
+    start_search = search
 
     def drive(self, work, most=None):
         """Carries it to its end, and returns what it returns; None if it was killed, or after
@@ -233,7 +237,7 @@ class Driver:
             assert self.shown(test.environment, test.run) is None, "it is known"
             if test.why == "round":
                 candidate = self._round.candidates[test.candidate]
-                assert test.environment == candidate.models | self.legs[-1][0].pinned
+                assert test.environment == candidate.models | self.searches[-1][0].pinned
         self._running += [test for test in wanted if test not in self._running][
             : self.workers - len(self._running)
         ]
@@ -252,7 +256,7 @@ class Driver:
 
     def failure_fixed(self, runs):
         self._step("failure_fixed", runs)
-        return self.leg()
+        return self.search()
 
     def round_began(self, number, round):
         """What is known of a round, if it is over."""
@@ -263,7 +267,7 @@ class Driver:
             return None
         winner = self.known.past[number]
         if winner is not None:
-            self._reach(round.candidates[winner].models | self.legs[-1][0].pinned)
+            self._reach(round.candidates[winner].models | self.searches[-1][0].pinned)
         return Past(winner)
 
     def judged(self, index, environment, verdict, runs):
@@ -306,12 +310,12 @@ class Driver:
         self._step("stepped_back", place, again, tests)
         self.now.lost.append(self.now.chain[place + 1])
         self.now.chain = self.now.chain[: place + 1]
-        return self.leg(again)
+        return self.search(again)
 
     def left_out(self, model, environment):
         self._step("left_out", model, environment)
         self._reach(environment)
-        return self.leg()
+        return self.search()
 
     def checked(self, check):
         self._step("checked", check)

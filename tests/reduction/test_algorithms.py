@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import ddenv
 from ddenv.environment import NOTHING, Environment
 from ddenv.reduction.algorithms import sweep
-from ddenv.reduction.guide import make_guide, search
+from ddenv.reduction.guide import begin_search, make_guide
 from ddenv.schemas import uses
 from tests.reduction.worlds import ALGORITHMS, PAIRS, carried_through, evidence, run, worlds
 from tests.tiers import examples
@@ -131,7 +131,7 @@ def test_nothing_is_implied_by_tests_that_broke():
         guide = make_guide(
             "model2model", "failure-proximal", lambda: known, skip="implied", growth="steady"
         )
-        searching = search("ddenv", range(8), replace(guide, broke=lambda candidate: broke))
+        searching = begin_search("ddenv", range(8), replace(guide, broke=lambda candidate: broke))
         return [one.models for one in list(_rounds(searching))[1].candidates]
 
     assert set(second_round(broke=False)) < set(second_round(broke=True))
@@ -164,7 +164,7 @@ def test_an_algorithm_uses_the_parts_of_the_pair_that_it_is_said_to_use(algorith
         return guide.rank(partitions)
 
     carried_through(
-        search(algorithm, range(9), replace(guide, split=split, rank=rank)),
+        begin_search(algorithm, range(9), replace(guide, split=split, rank=rank)),
         Environment.of((1, 7)).__le__,
     )
     assert used == set(uses(algorithm))

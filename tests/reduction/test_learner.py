@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from ddenv.environment import Environment
 from ddenv.reduction.evidence import Evidence, Traits, Trial, spatial_prior
-from ddenv.reduction.guide import make_guide, search
+from ddenv.reduction.guide import begin_search, make_guide
 from ddenv.reduction.learner import Learner, beliefs, undominated
 from tests.reduction.worlds import evidence, tried
 
@@ -149,7 +149,7 @@ def followed(weights):
             growth="steady",
             skip="implied",
         )
-        searching, winner = search("ddenv", range(30), guide), None
+        searching, winner = begin_search("ddenv", range(30), guide), None
         for _ in range(8):
             round = searching.send(winner)
             if len(round.environment) < 6:

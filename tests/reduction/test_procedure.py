@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from ddenv.environment import Environment
 from ddenv.evidence.certificate import good_enough, settle
 from ddenv.evidence.rates import estimated_rate
-from ddenv.reduction.procedure import Changed, Leg, judge, last_good, procedure
+from ddenv.reduction.procedure import Changed, Search, judge, last_good, procedure
 from ddenv.reduction.verdict import Acceptance
 from tests.reduction.driving import Driver, Killed, Known, World
 from tests.reduction.worlds import ALGORITHMS
@@ -33,9 +33,9 @@ worlds = st.builds(
 )
 
 
-def begun(driver, leg=None):
+def begun(driver, search=None):
     world = driver.world
-    return procedure(driver, world.whole, world.baseline_runs, world.keeps_rate, leg)
+    return procedure(driver, world.whole, world.baseline_runs, world.keeps_rate, search)
 
 
 def driven(world, **options):
@@ -90,11 +90,11 @@ def test_driven_again_through_what_is_known_it_comes_to_the_same_end(world, part
     assert again == end
     assert rounds(resumed.facts) == rounds(whole.facts)
     # From the last leg, as an engine does that is started again.
-    if killed.legs:
-        leg, now, before = killed.legs[-1]
+    if killed.searches:
+        search, now, before = killed.searches[-1]
         resumed = Driver(world, known=deepcopy(killed.known))
-        resumed.now, resumed.legs = deepcopy(now), [killed.legs[-1]]
-        assert resumed.drive(begun(resumed, leg)) == end
+        resumed.now, resumed.searches = deepcopy(now), [killed.searches[-1]]
+        assert resumed.drive(begun(resumed, search)) == end
         assert rounds(resumed.facts) == rounds(whole.facts[before:])
 
 
@@ -121,7 +121,7 @@ def test_where_a_decision_ends_a_search_it_goes_on_with_another(world, part, wor
     driver.interrupt = max(1, int(part * whole.steps)), Changed()
 
     def start_search():
-        decided.append(driver.leg())
+        decided.append(driver.search())
         return decided[-1]
 
     decided, driver.start_search = [], start_search
@@ -129,16 +129,16 @@ def test_where_a_decision_ends_a_search_it_goes_on_with_another(world, part, wor
         end = driver.drive(begun(driver))
     except Changed:
         # The baseline is no search.
-        assert not driver.legs
+        assert not driver.searches
     if not decided:
         return
-    leg, now, told = next(one for one in driver.legs if one[0] is decided[0])
+    search, now, told = next(one for one in driver.searches if one[0] is decided[0])
     other = Driver(world, workers)
-    other.now, other.legs = deepcopy(now), [(leg, now, 0)]
-    assert other.drive(begun(other, leg)) == end
+    other.now, other.searches = deepcopy(now), [(search, now, 0)]
+    assert other.drive(begun(other, search)) == end
     assert driver.facts[told:] == other.facts
     began = next(fact for fact in other.facts if fact[0] in ("round_began", "search_ended"))
-    assert began[0] == "search_ended" or began[1] == leg.first_round
+    assert began[0] == "search_ended" or began[1] == search.first_round
 
 
 drifting = st.builds(
@@ -237,10 +237,10 @@ def nothing(elements, guide):
 def certified_alone(world, vetoed=()):
     """What follows from a certificate of the whole world."""
     driver = Driver(world)
-    driver.algorithm = lambda leg: nothing(leg.chain[-1], None)
+    driver.algorithm = lambda search: nothing(search.chain[-1], None)
     driver.vetoed = {world.whole - Environment.of([model]) for model in vetoed}
     free = {model: Environment.of([model]) for model in world.whole}
-    leg = Leg(
+    search = Search(
         first_round=1,
         whole=world.whole,
         chain=(world.whole,),
@@ -248,7 +248,7 @@ def certified_alone(world, vetoed=()):
         free=free,
         rule=Acceptance(most_misses=1),
     )
-    driver.drive(begun(driver, leg), most=2000)
+    driver.drive(begun(driver, search), most=2000)
     return [fact[1] for fact in driver.facts if fact[0] == "left_out"]
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ddenv.environment import Environment
 from ddenv.reduction.evidence import Trial
-from ddenv.reduction.guide import make_guide, search
+from ddenv.reduction.guide import begin_search, make_guide
 from ddenv.reduction.round import Stacks
 from ddenv.runfile.supports import stacks
 from tests.reduction.test_algorithms import any_oracle, every_search
@@ -69,7 +69,7 @@ def test_no_candidate_breaks_a_stack_and_no_stack_can_be_left_out(
     guide = make_guide(
         *pair, lambda: replace(known, trials=trials), growth="steady", skip="implied"
     )
-    searching = found.expand(search(algorithm, found.representatives, guide))
+    searching = found.expand(begin_search(algorithm, found.representatives, guide))
     environment = Environment.whole(count)
     while True:
         try:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ddenv.environment import Environment
 from ddenv.reduction.evidence import Evidence, Traits, Trial
-from ddenv.reduction.guide import make_guide, search
+from ddenv.reduction.guide import begin_search, make_guide
 from ddenv.schemas import names, pairs
 
 PAIRS = [tuple(pair.split("/")) for pair in pairs()]
@@ -58,7 +58,7 @@ def run(known, is_similar, pair=("model2model", "failure-proximal"), algorithm="
     """What is left, and the rounds with their winners. The schemas see every test that was made."""
     trials = []
     guide = make_guide(*pair, lambda: replace(known, trials=trials), **options)
-    searching = search(algorithm, range(len(known.elements)), guide)
+    searching = begin_search(algorithm, range(len(known.elements)), guide)
 
     def learn(round, winner):
         trials.extend(

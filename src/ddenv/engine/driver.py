@@ -29,8 +29,8 @@ from ddenv.evidence.rates import anytime_interval, estimated_rate, iterations_ne
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Trial
-from ddenv.reduction.guide import make_guide, search
-from ddenv.reduction.round import Partition, Round, Search, Stacks
+from ddenv.reduction.guide import begin_search, make_guide
+from ddenv.reduction.round import Partition, Round, Rounds, Stacks
 from ddenv.reduction.verdict import Acceptance
 from ddenv.robot.settled import notes_on
 from ddenv.runfile import events
@@ -102,7 +102,7 @@ class Driver:
         self._trials: dict[int, Trial] = {}
         self._unknown: set[Environment] = set()
         # Of the current search: they are there once it has begun.
-        self._leg: steps.Leg
+        self._current_search: steps.Search
         self._stacks: Stacks
         self._evidence: Evidence
         # What the baseline shows so far, or why there is nothing to reduce.
@@ -124,7 +124,7 @@ class Driver:
         reduction = self._reduction
         # Unknown names are refused before a robot runs.
         self.algorithm(
-            steps.Leg(
+            steps.Search(
                 first_round=1,
                 whole=NOTHING,
                 chain=(NOTHING,),
@@ -134,12 +134,12 @@ class Driver:
             )
         )
         self._settle()
-        leg = None if journal.state.baseline is None else self._first_leg()
+        search = None if journal.state.baseline is None else self._first_search()
         whole = journal.state.environments[0]
         keeps_rate = reduction.accept_rate == "kept"
         alike = ENOUGH_ALIKE if settings(journal.state).reduces_one_run else None
         procedure = steps.procedure(
-            self, whole, reduction.baseline_runs, keeps_rate, leg, enough_alike=alike
+            self, whole, reduction.baseline_runs, keeps_rate, search, enough_alike=alike
         )
         if self._scheduler.carry_out(procedure) is None:
             self._end(False, str(self._baseline))
@@ -195,20 +195,20 @@ class Driver:
         """
         self._certify_rate = certify_rate
         # A search that is due would begin at the end.
-        leg = self._next_leg()
+        search = self._next_search()
         self._only_certify = at_least
         chain = tuple(
             self._journal.state.environments[node.id] for node in self._journal.state.path
         )
         try:
-            self._scheduler.carry_out(steps.certify(self, leg, chain))
+            self._scheduler.carry_out(steps.certify(self, search, chain))
         except steps.Changed:
             self.start_search()
             raise Stopped(CHANGED) from None
         self._conclude()
 
-    def _first_leg(self) -> steps.Leg:
-        """The leg of an engine that starts after the baseline, or at its end."""
+    def _first_search(self) -> steps.Search:
+        """The search of an engine that starts after the baseline, or at its end."""
         self._control.search_begins()
         # An engine that was killed may not have compared its last one.
         compare(self._journal, self._journal.state.finished_tests)
@@ -218,13 +218,13 @@ class Driver:
                 self._scheduler.wait_for_search()
         return self.start_search()
 
-    def start_search(self) -> steps.Leg:
+    def start_search(self) -> steps.Search:
         slice_environment(self._journal)
-        return self._next_leg()
+        return self._next_search()
 
-    def _next_leg(self) -> steps.Leg:
+    def _next_search(self) -> steps.Search:
         journal = self._journal
-        if journal.state.leg is None or journal.state.search_due:
+        if journal.state.search is None or journal.state.search_due:
             self._check_repeats()
             before = journal.state
             first = 1 if before.round is None else before.round.number + 1
@@ -237,46 +237,46 @@ class Driver:
                     round=first, n_partitions=before.nodes[before.node].n_partitions, rate=rate
                 )
             )
-        leg = journal.state.leg
-        assert leg is not None
-        self._reduction = Reduction.model_validate(leg.settings)
+        search = journal.state.search
+        assert search is not None
+        self._reduction = Reduction.model_validate(search.settings)
         # It may leave out whole stacks, and none with a model that is pinned.
         state = journal.state
         asked = self._reduction
         exact = exact_runs(journal.state)
         together = Stacks.of(
-            map(journal.models, stacks_of(state, state.nodes[leg.node].environment))
+            map(journal.models, stacks_of(state, state.nodes[search.node].environment))
         )
-        stays = journal.models(leg.pinned)
+        stays = journal.models(search.pinned)
         stays |= together.of_any(stays)
         free = {
             model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)
         }
         rule = Acceptance(
             most_misses=1 + asked.iterations,
-            rate=leg.rate,
+            rate=search.rate,
             keep_rate=asked.keep_rate,
-            steps_back=leg.steps_back,
+            steps_back=search.steps_back,
             broke=broken_runs(state),
         )
         rule = self._scheduler.rule = (
             Acceptance(most_misses=len(exact), exact=exact) if exact else rule
         )
-        chain = tuple(state.environments[node.id] for node in self._nodes(leg.node))
-        self._leg = steps.Leg(
-            first_round=leg.first_round,
+        chain = tuple(state.environments[node.id] for node in self._nodes(search.node))
+        self._current_search = steps.Search(
+            first_round=search.first_round,
             whole=journal.whole,
             chain=chain,
             pinned=stays,
             free=free,
             rule=rule,
-            n_partitions=leg.n_partitions,
-            again=leg.again,
+            n_partitions=search.n_partitions,
+            again=search.again,
         )
         self._trials = {}
         self._unknown = set()
-        self._learn(leg.tests, leg.evidence_test)
-        return self._leg
+        self._learn(search.tests, search.evidence_test)
+        return self._current_search
 
     def _check_repeats(self) -> None:
         """Raises UserError if the first search that reduces chosen runs exactly begins, and one of
@@ -284,7 +284,7 @@ class Driver:
         """
         journal = self._journal
         exact = exact_runs(journal.state)
-        last = journal.state.leg
+        last = journal.state.search
         if not exact or (last is not None and last.settings["accept_rate"] == "exact"):
             return
         if stands_for_all(journal.state):
@@ -329,30 +329,32 @@ class Driver:
         automatic = self._journal.state.accept_mode == "automatic"
         return self._only_certify is None and automatic and self._reduction.accept_rate == "kept"
 
-    def algorithm(self, leg: steps.Leg) -> Search:
+    def algorithm(self, search: steps.Search) -> Rounds:
         """The algorithm and the schemas by name. Raises UserError for unknown ones."""
         asked = self._reduction
-        self._stacks = Stacks(leg.free)
+        self._stacks = Stacks(search.free)
         guide = make_guide(
             *split_pair(asked.pair),
             # Only rounds use it, after the first similar run.
             lambda: replace(self._evidence, trials=tuple(self._trials.values())),
-            n_partitions=leg.n_partitions or asked.n_partitions,
-            rate=lambda: leg.rule.rate or known_failure(self._journal.state).rate,
-            runs=lambda: leg.rule.misses,
+            n_partitions=search.n_partitions or asked.n_partitions,
+            rate=lambda: search.rule.rate or known_failure(self._journal.state).rate,
+            runs=lambda: search.rule.misses,
             # The algorithm knows one model of each stack.
             broke=lambda candidate: (
-                leg.pinned | Environment.of(self._stacks.expanded(candidate.models))
+                search.pinned | Environment.of(self._stacks.expanded(candidate.models))
                 in self._unknown
             ),
-            proves=leg.rule.proves,
+            proves=search.rule.proves,
             **{
                 name: getattr(asked, name)
                 for name in ("prior", "candidates", "complement_order", "growth", "skip")
             },
         )
-        searched = partial(search, asked.algorithm, guide=guide)
-        return self._stacks.expand(tried_again(self._stacks.representatives, leg.again, searched))
+        searched = partial(begin_search, asked.algorithm, guide=guide)
+        return self._stacks.expand(
+            tried_again(self._stacks.representatives, search.again, searched)
+        )
 
     def _learn(self, tests: Iterable[int], similar: int | None) -> None:
         """The schemas see the tests behind the verdicts of a round, and the last similar run: a
@@ -401,7 +403,7 @@ class Driver:
         first, *others = (self._journal.file.samples(test.id) for test in tests)
         return all(other == first for other in others)
 
-    def failure_fixed(self, runs: int) -> steps.Leg:
+    def failure_fixed(self, runs: int) -> steps.Search:
         assert not isinstance(self._baseline, str)
         limit = limit_after(self._journal.state, self._scenario.failure.timeout)
         self._journal.record(replace(self._baseline, wall_limit=limit))
@@ -410,20 +412,21 @@ class Driver:
         if note_rare(self._journal) or scatters:
             self._control.offered()
         self._control.round_finished()
-        return self._first_leg()
+        return self._first_search()
 
     def round_began(self, number: int, round: Round) -> steps.Past | None:
         state = self._journal.state
-        leg = self._journal.state.leg
+        search = self._journal.state.search
         parts = tuple(map(Environment.of, round.partitions))
-        assert leg is not None
-        if leg.first_round + len(leg.past) > number:
-            past = leg.past[number - leg.first_round]
+        assert search is not None
+        if search.first_round + len(search.past) > number:
+            past = search.past[number - search.first_round]
             if past.digest != digest(parts):
                 raise UserError(OTHER_WAY.format(number))
             self._learn(past.tests, past.evidence_test)
             self._unknown.update(
-                round.candidates[index].models | self._leg.pinned for index in past.unknown
+                round.candidates[index].models | self._current_search.pinned
+                for index in past.unknown
             )
             return steps.Past(past.winner)
         if state.round is None or state.round.number < number:
@@ -436,11 +439,11 @@ class Driver:
 
     def _announce(self, number: int, round: Round) -> None:
         journal = self._journal
-        leg = self._leg
+        search = self._current_search
         # These schemas score by distance in m, which is useful to show.
         shown = self._reduction.algorithm == "ddenv" and self._reduction.pair.endswith("-proximal")
         scores = [float(f"{score:.3f}") if shown else None for score in round.scores]
-        environment = Environment.of(round.environment) | leg.pinned
+        environment = Environment.of(round.environment) | search.pinned
         journal.record(
             events.RoundStarted(
                 round=number,
@@ -450,17 +453,17 @@ class Driver:
                 candidates=tuple(
                     (one.kind, one.partition, scores[one.partition]) for one in round.candidates
                 ),
-                pinned=leg.pinned & environment,
+                pinned=search.pinned & environment,
             )
         )
-        models = sum(stack <= environment for stack in leg.free.values())
+        models = sum(stack <= environment for stack in search.free.values())
         expected = search_tests(models, self._reduction, known_failure(journal.state).rate)
         journal.record(
             events.Forecast(round=number, tests=expected, tests_done=journal.state.tests_done)
         )
         refused = {refusal.environment: refusal.verdict for refusal in journal.state.refused}
         for index, one in enumerate(round.candidates) if refused else ():
-            if verdict := refused.get(one.models | leg.pinned):
+            if verdict := refused.get(one.models | search.pinned):
                 journal.record(
                     events.Vetoed(round=number, candidate=index, verdict=verdict, again=True)
                 )
@@ -473,7 +476,7 @@ class Driver:
             self._unknown.add(environment)
         if round.candidates[index].verdict:
             return
-        tests = journal.tests(environment, map(self._leg.rule.run, range(runs)))
+        tests = journal.tests(environment, map(self._current_search.rule.run, range(runs)))
         journal.record(
             events.CandidateJudged(
                 round=round.number, candidate=index, verdict=verdict, tests=tests
@@ -509,8 +512,8 @@ class Driver:
         if not journal.current.done:
             journal.record(events.RoundFinished(round=number))
             self._control.round_finished()
-        assert journal.state.leg is not None
-        past = journal.state.leg.past[-1]
+        assert journal.state.search is not None
+        past = journal.state.search.past[-1]
         self._learn(past.tests, past.evidence_test)
         if winner is None and self._scenario.oracle is not None:
             self._check_shows(number)
@@ -568,7 +571,7 @@ class Driver:
             else:
                 before = None
             # Where chosen runs were reduced, a rate is shown if the user asks for one.
-            exact = () if self._certify_rate else self._leg.rule.exact
+            exact = () if self._certify_rate else self._current_search.rule.exact
             shown = [run for run in exact if journal.shown(journal.environment, run)]
             seeds = tuple(
                 journal.state.test(test).seed for test in journal.tests(journal.environment, shown)
@@ -599,7 +602,9 @@ class Driver:
             journal.record(started)
             last = journal.state.certificates[-1]
         terms = terms_of(journal.state, last)
-        return steps.Certificate(last.first_run, terms, self._leg.rule.exact if last.seeds else ())
+        return steps.Certificate(
+            last.first_run, terms, self._current_search.rule.exact if last.seeds else ()
+        )
 
     def certified(self, made: steps.Certified) -> None:
         if not self._certificate.claims:
@@ -734,7 +739,7 @@ class Driver:
             raise Stopped(CHANGED)
         stacks = stacks_of(journal.state, journal.state.environment)
         together = self._reduction.keep_supports or any(len(stack) > 1 for stack in stacks)
-        pinned = self._leg.pinned & journal.environment
+        pinned = self._current_search.pinned & journal.environment
         left = certificate.claims[0]
         # Where what is left is lost, f still shows in the whole world.
         is_gone = left.verdict == "not shown" and not left.shown

@@ -22,7 +22,7 @@ from ddenv.reduction.round import (
     Candidate,
     Partition,
     Round,
-    Search,
+    Rounds,
     in_order,
     left_out,
     make_round,
@@ -37,7 +37,7 @@ DOUBT = 0.25
 MANY_NEEDED = 6
 
 
-def ddenv(elements: Partition, guide: Guide) -> Search:
+def ddenv(elements: Partition, guide: Guide) -> Rounds:
     """The paper's algorithm. Each round splits the environment into n partitions and tries them in
     the order of the prioritization, each followed by its complement. The first candidate that shows
     the failure becomes the environment. n grows with the rounds. The search ends when no candidate
@@ -139,7 +139,7 @@ def _without_implied(round: Round, missed: list[Environment], proves: bool) -> R
     return replace(round, candidates=tuple(worth))
 
 
-def ddmin(elements: Partition, guide: Guide | None = None) -> Search:
+def ddmin(elements: Partition, guide: Guide | None = None) -> Rounds:
     """Classic delta debugging. It cuts the environment into n chunks in the order of the world
     file, and first tries each chunk alone, then each complement. A chunk that shows the failure is
     split in two; a complement keeps its n - 1 chunks; when nothing shows the failure, n doubles. It
@@ -175,7 +175,7 @@ def _cut(environment: Partition, n: int) -> list[Partition]:
     return [environment[size * part // n : size * (part + 1) // n] for part in range(n)]
 
 
-def probdd(elements: Partition, guide: Guide) -> Search:
+def probdd(elements: Partition, guide: Guide) -> Rounds:
     """Probabilistic delta debugging. Each model has a probability of being needed, at first from
     its distance to the failure (or the same for all, with the scenario's key `reduction.prior:
     uniform`). Each test leaves out the group with the greatest expected gain; if the failure does
@@ -211,7 +211,7 @@ def _best_group(environment: Partition, chance: dict[int, float]) -> Partition:
     return tuple(order[: 1 + int(np.argmax(none_needed * np.arange(1, len(order) + 1)))])
 
 
-def splitting(elements: Partition, guide: Guide) -> Search:
+def splitting(elements: Partition, guide: Guide) -> Rounds:
     """Binary splitting. It sorts the models by the prioritization, far to near. Each test leaves
     out a group from the far end, of the most informative size: the failure shows about as often as
     not. If it does not show, smaller groups are left out, until the farthest needed model is found.
@@ -282,7 +282,7 @@ def _most_telling(rate: float) -> float:
     return 1.0 / (rate * (1.0 + math.exp2(entropy / rate)))
 
 
-def sweep(environment: Partition, runs: int | None = None) -> Search:
+def sweep(environment: Partition, runs: int | None = None) -> Rounds:
     """Leaves out each model in turn, in the environment's order, until none can be left out;
     returns what remains.
 
@@ -306,8 +306,8 @@ def sweep(environment: Partition, runs: int | None = None) -> Search:
 
 
 def tried_again(
-    environment: Partition, groups: Sequence[Partition], search: Callable[[Partition], Search]
-) -> Search:
+    environment: Partition, groups: Sequence[Partition], search: Callable[[Partition], Rounds]
+) -> Rounds:
     """Leaves out each group, or halves of it where that fails; then searches what is left. For a
     search that stepped back.
     """

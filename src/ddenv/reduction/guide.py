@@ -17,7 +17,7 @@ from ddenv import schemas
 from ddenv.arrays import Floats
 from ddenv.errors import UserError
 from ddenv.reduction.evidence import Evidence, Lacking, spatial_prior
-from ddenv.reduction.round import Candidate, Partition, Search
+from ddenv.reduction.round import Candidate, Partition, Rounds
 
 # The prior without any positions (Wang et al. 2021).
 UNIFORM = 0.1
@@ -105,9 +105,9 @@ def make_guide(
     return Guide(split=split_now, rank=rank_now, chances=chances_now, **more)
 
 
-def search(algorithm: str, elements: Iterable[int], guide: Guide) -> Search:
+def begin_search(algorithm: str, elements: Iterable[int], guide: Guide) -> Rounds:
     """The algorithm `algorithm`, before its first round. Raises UserError for an unknown name."""
-    searching: Search = schemas.load("algorithm", algorithm)(tuple(elements), guide)
+    searching: Rounds = schemas.load("algorithm", algorithm)(tuple(elements), guide)
     return searching
 
 

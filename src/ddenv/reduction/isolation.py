@@ -20,7 +20,7 @@ from ddenv.evidence.certificate import Verdict as ClaimVerdict
 from ddenv.evidence.rates import estimated_rate, leans_to
 from ddenv.reduction.algorithms import ddmin
 from ddenv.reduction.procedure import NamedClaim, Runs, Work, judge, settled
-from ddenv.reduction.round import Candidate, Partition, Round, Search, Stacks
+from ddenv.reduction.round import Candidate, Partition, Round, Rounds, Stacks
 from ddenv.reduction.verdict import Verdict
 
 # A world passes if the robot reaches its goal in so many of its runs, and fails in at most this
@@ -242,7 +242,7 @@ def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Wor
     return Checked(removed, (yield from settled(driver, claims(), ends, first, "isolate")))
 
 
-def isolating(suspects: Partition, first: int) -> Search:
+def isolating(suspects: Partition, first: int) -> Rounds:
     """What has to go from the whole world; empty if the robot does not pass even without all
     `suspects`.
 

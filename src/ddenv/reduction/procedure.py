@@ -37,7 +37,7 @@ from ddenv.evidence.certificate import (
     often,
 )
 from ddenv.evidence.rates import Shown, ShownIn
-from ddenv.reduction.round import Candidate, Partition, Round, Search
+from ddenv.reduction.round import Candidate, Partition, Round, Rounds
 from ddenv.reduction.verdict import (
     FEWEST_SHOWN,
     LONGEST_BASELINE,
@@ -104,7 +104,7 @@ class Past:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Leg:
+class Search:
     """Where a search begins: `chain` leads to the environment that is searched, from the first one
     to which it may go back. What is left has to keep the rate of f in `whole`.
 
@@ -217,13 +217,13 @@ class Driver(Runs, Protocol):
         no failure to reduce.
         """
 
-    def failure_fixed(self, runs: int) -> Leg:
-        """The baseline of so many runs is over; returns the leg with which the search begins."""
+    def failure_fixed(self, runs: int) -> Search:
+        """The baseline of so many runs is over; returns the search that begins."""
 
-    def start_search(self) -> Leg:
+    def start_search(self) -> Search:
         """The next search, after `Changed`."""
 
-    def algorithm(self, leg: Leg) -> Search:
+    def algorithm(self, search: Search) -> Rounds:
         """The algorithm, before its first round."""
 
     def round_began(self, number: int, round: Round) -> Past | None:
@@ -248,13 +248,13 @@ class Driver(Runs, Protocol):
 
     def stepped_back(
         self, place: int, again: tuple[Partition, ...], tests: tuple[NumberedRun, ...]
-    ) -> Leg:
+    ) -> Search:
         """What is left lost the rate, by these fresh tests, as (environment, run): the search goes
         back to place number `place` of the chain, and leaves out the groups `again` first. The
         environment at `place` + 1 and all its parts are not taken again.
         """
 
-    def left_out(self, model: int, environment: Environment) -> Leg:
+    def left_out(self, model: int, environment: Environment) -> Search:
         """Without `model` f shows about as often, so the search goes on in `environment`."""
 
 
@@ -267,29 +267,29 @@ def procedure(
     whole: Environment,
     baseline_runs: int,
     keeps_rate: bool,
-    leg: Leg | None = None,
+    search: Search | None = None,
     enough_alike: int | None = None,
 ) -> Work[Certified | None]:
-    """The whole reduction, or all from `leg` on. Returns the last certificate; None if there was no
-    failure to reduce.
+    """The whole reduction, or all from `search` on. Returns the last certificate; None if there was
+    no failure to reduce.
     """
     certified = None
-    if leg is None:
-        leg = yield from baseline(driver, whole, baseline_runs, keeps_rate, enough_alike)
-    while leg is not None:
+    if search is None:
+        search = yield from baseline(driver, whole, baseline_runs, keeps_rate, enough_alike)
+    while search is not None:
         try:
-            chain = yield from search_on(driver, leg)
+            chain = yield from search_on(driver, search)
             driver.search_ended(chain[-1])
-            certified = yield from certify(driver, leg, chain)
-            leg = yield from onward(driver, leg, chain, certified)
+            certified = yield from certify(driver, search, chain)
+            search = yield from onward(driver, search, chain, certified)
         except Changed:
-            leg = driver.start_search()
+            search = driver.start_search()
     return certified
 
 
 def baseline(
     driver: Driver, whole: Environment, runs: int, keeps_rate: bool, enough_alike: int | None = None
-) -> Work[Leg | None]:
+) -> Work[Search | None]:
     """Runs the whole world. To keep the rate of a rare f, it goes on, one run at a time, so that
     workers change nothing. If the first `enough_alike` runs are alike to the last bit, no more are
     made.
@@ -318,34 +318,34 @@ def baseline(
             return driver.failure_fixed(runs)
 
 
-def search_on(driver: Driver, leg: Leg) -> Work[tuple[Environment, ...]]:
+def search_on(driver: Driver, search: Search) -> Work[tuple[Environment, ...]]:
     """Takes what the algorithm finds, to its end; returns the chain of environments."""
-    chain = leg.chain
-    algorithm = driver.algorithm(leg)
+    chain = search.chain
+    algorithm = driver.algorithm(search)
     winner = None
-    number = leg.first_round
+    number = search.first_round
     while True:
         try:
             round = algorithm.send(winner)
         except StopIteration:
             return chain
-        winner = yield from _round(driver, leg, number, round)
+        winner = yield from _round(driver, search, number, round)
         if winner is not None:
-            chain = (*chain, winner.models | leg.pinned)
+            chain = (*chain, winner.models | search.pinned)
         number += 1
 
 
-def _round(driver: Driver, leg: Leg, number: int, round: Round) -> Work[Candidate | None]:
+def _round(driver: Driver, search: Search, number: int, round: Round) -> Work[Candidate | None]:
     """Tests the candidates of a round until one is similar, and accepted; returns it, or None."""
     past = driver.round_began(number, round)
     if past is not None:
         if past.winner is None:
             return None
         return round.candidates[past.winner]
-    environments = [candidate.models | leg.pinned for candidate in round.candidates]
-    rule = leg.rule.within(round.runs)
+    environments = [candidate.models | search.pinned for candidate in round.candidates]
+    rule = search.rule.within(round.runs)
     while True:
-        winner = yield from judge(driver, environments, rule, "round", leg.rule)
+        winner = yield from judge(driver, environments, rule, "round", search.rule)
         if winner is None or driver.similar(number, winner, environments[winner]):
             break
     driver.round_ended(number, winner)
@@ -415,16 +415,16 @@ def judge(
         )
 
 
-def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Work[Certified]:
+def certify(driver: Driver, search: Search, chain: Sequence[Environment]) -> Work[Certified]:
     """Fresh runs show whether what is left keeps the rate of f, and whether it falls without each
     model.
     """
     left = chain[-1]
-    whole = leg.whole
-    while missing := [run for run in leg.rule.exact if driver.shown(left, run) is None]:
+    whole = search.whole
+    while missing := [run for run in search.rule.exact if driver.shown(left, run) is None]:
         yield tuple(Test(environment=left, run=run, why="round") for run in missing)
     certificate = driver.certificate_due()
-    rests = {model: left - stack for model, stack in leg.free.items() if stack <= left}
+    rests = {model: left - stack for model, stack in search.free.items() if stack <= left}
     fresh = _fresh(driver, certificate.first_run)
 
     def ends(claim: NamedClaim) -> bool:
@@ -665,14 +665,14 @@ def _have_turn(of_left: NamedClaim, fresh: ShownIn) -> bool:
 
 
 def onward(
-    driver: Driver, leg: Leg, chain: Sequence[Environment], certified: Certified
-) -> Work[Leg | None]:
+    driver: Driver, search: Search, chain: Sequence[Environment], certified: Certified
+) -> Work[Search | None]:
     """Where the search goes on after a certificate; None if it has come to its end."""
     if not driver.goes_on():
         return None
     left, *removals = certified.claims
     if left.claim.verdict == "lost":
-        if leg.rule.steps_back < MOST_STEPS_BACK and len(chain) > 1:
+        if search.rule.steps_back < MOST_STEPS_BACK and len(chain) > 1:
             return (yield from _step_back(driver, chain, certified))
         return None
     for claim in removals:
@@ -685,7 +685,7 @@ def onward(
     return None
 
 
-def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Work[Leg]:
+def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Work[Search]:
     """Back to the last environment that is not shown to have lost the rate of all runs of the whole
     world.
 

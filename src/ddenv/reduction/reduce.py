@@ -32,8 +32,8 @@ from ddenv.evidence.rates import Shown, anytime_interval, estimated_rate, wilson
 from ddenv.reduction import procedure as steps
 from ddenv.reduction.algorithms import tried_again
 from ddenv.reduction.evidence import Evidence, Place, Traits, Trial
-from ddenv.reduction.guide import make_guide, search
-from ddenv.reduction.round import Partition, Round, Search
+from ddenv.reduction.guide import begin_search, make_guide
+from ddenv.reduction.round import Partition, Round, Rounds
 from ddenv.reduction.verdict import Acceptance, standing
 from ddenv.run_numbers import CALLS_OF_CERTIFICATE
 from ddenv.settings import SETTINGS
@@ -242,19 +242,21 @@ def reduce(
         seed=int(seed),
     )
 
-    def begin(leg: steps.Leg) -> Search:
+    def begin(search: steps.Search) -> Rounds:
         guide = make_guide(
             partitioning,
             prioritization,
             lambda: replace(known, trials=caller.trials),
-            n_partitions=leg.n_partitions or n_partitions,
-            rate=lambda: leg.rule.rate or caller.share_shown,
-            runs=lambda: leg.rule.misses,
-            proves=leg.rule.proves,
+            n_partitions=search.n_partitions or n_partitions,
+            rate=lambda: search.rule.rate or caller.share_shown,
+            runs=lambda: search.rule.misses,
+            proves=search.rule.proves,
             prior=prior,
             **variants,
         )
-        return tried_again(tuple(leg.chain[-1]), leg.again, partial(search, algorithm, guide=guide))
+        return tried_again(
+            tuple(search.chain[-1]), search.again, partial(begin_search, algorithm, guide=guide)
+        )
 
     caller = _Caller(
         names=names,
@@ -307,7 +309,7 @@ class _Caller:
 
     names: Names
     test: Test
-    begin: Callable[[steps.Leg], Search]
+    begin: Callable[[steps.Search], Rounds]
     keep_rate: float
     certify_rate: float
     iterations: int
@@ -380,13 +382,13 @@ class _Caller:
         # To an end that is not shown to be lost it goes back in any case.
         return self._affordable > 0 or not self._shown
 
-    def algorithm(self, leg: steps.Leg) -> Search:
+    def algorithm(self, search: steps.Search) -> Rounds:
         """The algorithm, up to where what is left of the calls is needed for a certificate."""
-        search = self.begin(leg)
+        rounds = self.begin(search)
         winner = None
         while self._affordable >= CERTIFICATE_SHARE * self.most_tests:
             try:
-                winner = yield search.send(winner)
+                winner = yield rounds.send(winner)
             except StopIteration as end:
                 return cast(Environment, end.value)
         return self.left
@@ -395,9 +397,9 @@ class _Caller:
         """Takes the first call with the failure; returns whether the failure was gone without each
         element that is left.
         """
-        leg = self.start_search()
-        self.carry_out(steps.search_on(self, leg))
-        verdicts = (standing([rest], self.shown, leg.rule)[0] for rest in self._removals())
+        search = self.start_search()
+        self.carry_out(steps.search_on(self, search))
+        verdicts = (standing([rest], self.shown, search.rule)[0] for rest in self._removals())
         return all(verdict == ["dissimilar"] for verdict in verdicts)
 
     def search_if_steady(self, check: bool) -> bool | None:
@@ -461,10 +463,10 @@ class _Caller:
             raise UserError(NEVER_SHOWS.format(count(runs, "call"), math.ceil(100 * most)))
         return steps.Baseline(sum(self._of_whole))
 
-    def failure_fixed(self, runs: int) -> steps.Leg:
+    def failure_fixed(self, runs: int) -> steps.Search:
         return self.start_search()
 
-    def start_search(self, again: tuple[Partition, ...] = ()) -> steps.Leg:
+    def start_search(self, again: tuple[Partition, ...] = ()) -> steps.Search:
         rate = self.rate() if self.keep_rate else 0.0
         # While calls are left it goes back, however often.
         steps_back = min(len(self._lost), steps.MOST_STEPS_BACK - 1)
@@ -476,7 +478,7 @@ class _Caller:
         )
         free = {element: Environment.of((element,)) for element in self.left}
         n_partitions = self._n_partitions.get(self.left)
-        return steps.Leg(
+        return steps.Search(
             first_round=self.rounds + 1,
             whole=self.whole,
             chain=self._chain,
@@ -557,12 +559,12 @@ class _Caller:
         if claims[0].verdict != "lost":
             self._shown[self.left] = self.claims
 
-    def stepped_back(self, place: int, again: tuple[Partition, ...], tests: object) -> steps.Leg:
+    def stepped_back(self, place: int, again: tuple[Partition, ...], tests: object) -> steps.Search:
         self._lost.append(self._chain[place + 1])
         self._go(*self._chain[: place + 1])
         return self.start_search(again)
 
-    def left_out(self, model: int, environment: Environment) -> steps.Leg:
+    def left_out(self, model: int, environment: Environment) -> steps.Search:
         self._go(*self._chain, environment)
         return self.start_search()
 

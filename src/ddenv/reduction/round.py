@@ -50,7 +50,7 @@ class Round:
 
 
 # Yields rounds, is sent the winner of each or None, and returns what is left.
-Search = Generator[Round, Candidate | None, Environment]
+Rounds = Generator[Round, Candidate | None, Environment]
 
 
 def one_model_partitions(environment: Partition) -> list[Partition]:
@@ -164,7 +164,7 @@ class Stacks:
                 whole |= stack
         return whole
 
-    def expand(self, search: Search) -> Search:
+    def expand(self, search: Rounds) -> Rounds:
         """`search`, which knows only the representatives, as a search that tests whole stacks."""
         if all(len(stack) == 1 for stack in self.by_first.values()):
             return (yield from search)

@@ -349,7 +349,7 @@ def reduced(state: RunState, event: e.Reduced, at: float) -> Changes:
 def round_finished(state: RunState, event: e.RoundFinished, _: float) -> Changes:
     round = current(state)
     changes: Changes = {"round": replace(round, done=True), "rounds_done": round.number}
-    if state.leg is not None:
+    if state.search is not None:
         last = len(round.candidates)
         evidence = None
         if round.winner is not None:
@@ -365,7 +365,7 @@ def round_finished(state: RunState, event: e.RoundFinished, _: float) -> Changes
             tests=tests,
             unknown=unknown,
         )
-        changes["leg"] = replace(state.leg, past=(*state.leg.past, past))
+        changes["search"] = replace(state.search, past=(*state.search.past, past))
     return changes
 
 

@@ -20,7 +20,7 @@ from ddenv.runfile.fold_tests import (
     with_outcomes,
     with_trial,
 )
-from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal, path
+from ddenv.runfile.progress import Decision, Isolation, Node, Point, Refusal, Search, path
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState, Test, Trial
 from ddenv.settings import SETTINGS, read
@@ -203,7 +203,7 @@ def leg_started(state: RunState, event: e.LegStarted, _: float) -> Changes:
     """A search starts from the current environment."""
     if state.evidence_test is None:
         raise ValueError("f is not known")
-    leg = Leg(
+    search = Search(
         first_round=event.round,
         node=state.node,
         n_partitions=event.n_partitions,
@@ -215,7 +215,13 @@ def leg_started(state: RunState, event: e.LegStarted, _: float) -> Changes:
         tests=tuple(test for test in state.judged if state.test(test).is_finished),
         again=state.again,
     )
-    return {**searched_anew(state), "search_due": False, "forecast": None, "leg": leg, "again": ()}
+    return {
+        **searched_anew(state),
+        "search_due": False,
+        "forecast": None,
+        "search": search,
+        "again": (),
+    }
 
 
 def arrived(

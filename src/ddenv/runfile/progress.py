@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Leg:
+class Search:
     """The start of a search: the number of its first round, the node that it starts from, and what
     was known then. `n_partitions` is None for the scenario's value. `tests` are those that verdicts
     rested on, for schemas that learn. A candidate has to keep the `rate` of f, 0 if its first run

@@ -16,7 +16,7 @@ from ddenv.text import Data, Names
 
 if TYPE_CHECKING:
     from ddenv.runfile.events import BaselineFinished, EarlyStopEnded, Forecast, Place
-    from ddenv.runfile.progress import Certificate, Decision, Leg, Point, Refusal, Removal
+    from ddenv.runfile.progress import Certificate, Decision, Point, Refusal, Removal, Search
 
 # Items in a chunk. A change copies one chunk and the list of chunks; for the longest runs (60,000
 # tests) both are about as long.
@@ -125,11 +125,11 @@ class RunState:
 
     `confirming`: the rounds are over, and full runs with fresh seeds show what the result is worth:
     the last of `certificates`; `fresh` are the ids of its tests. The run came to `node` when
-    `came_at` tests were finished. Once `search_due`, a new `leg` has to begin. `judged` are the
+    `came_at` tests were finished. Once `search_due`, a new `search` has to begin. `judged` are the
     tests that verdicts rest on, in their order. `refused` environments are not taken because the
     user said so, `lost` ones with all of their parts because they lost the rate of f, each beside
     the failures that counted as f then: the search went so many `steps_back`, and leaves out the
-    groups `again` first in the next leg. The ends of the tests in `failures` count as f in the
+    groups `again` first in the next search. The ends of the tests in `failures` count as f in the
     current node. `lower_bound` is the minimum number of models needed, if f shows wherever
     everything it needs is present. `supports`, `welds` and `ties` have (model, other): it rests on
     the other once the whole world has settled (found while `settling`; `unsettled` says why it
@@ -153,7 +153,7 @@ class RunState:
     elements: Names = ()
     environments: PersistentTuple[Environment] = field(default_factory=PersistentTuple)
     environment: Names = ()
-    leg: Leg | None = None
+    search: Search | None = None
     search_due: bool = False
     judged: PersistentTuple[int] = field(default_factory=PersistentTuple)
     refused: tuple[Refusal, ...] = ()
