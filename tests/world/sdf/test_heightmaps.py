@@ -16,8 +16,11 @@ from PIL import Image
 
 from ddenv.errors import UserError
 from ddenv.map.footprints import footprints
+from ddenv.workbench.setup.missing_files import MISSING, read_with_remedies
+from ddenv.world.access import MissingFiles
 from ddenv.world.files.resources import Resources
-from ddenv.world.model import World, is_ground
+from ddenv.world.model import Box, World, is_ground
+from ddenv.world.scenario import Reading
 from ddenv.world.sdf.read import parse_world
 from ddenv.world.terrain import height_at
 from ddenv.world.write import convert
@@ -118,6 +121,28 @@ def test_what_is_no_heightmap_is_refused_in_one_line(read, tmp_path: Path, conte
     said = str(caught.value)
     assert f"/heightmap: heightmap 'hill.png' is unreadable: {why}" in said
     assert said.endswith("leave it out with --ignore heightmap") and "\n" not in said
+
+
+def test_a_missing_image_has_the_remedies_of_any_missing_file(read, tmp_path):
+    with pytest.raises(
+        MissingFiles,
+        match=r"heightmap 'hill.png' is not available: .* give its folder .* --ignore heightmap",
+    ) as caught:
+        read(heightmap())
+    assert caught.value.uris == {"hill.png": ""}
+    guessed = read(heightmap(), stand_ins={"*": "auto"})
+    assert heights(guessed, [-2, 0, 2], [1, 0, -1]) == [0, 0, 0]
+    assert "'hill.png' by a guess, level ground: looked" in guessed.notes[0].why
+    boxed = read(heightmap(), stand_ins={"hill.png": "box:4,2,1"}).models[0]
+    assert boxed.collisions[0].shape == Box((4, 2, 1))
+    assert not read(heightmap(), stand_ins={"hill.png": "none"}).models[0].collisions
+    # As the workbench lists it.
+    world = tmp_path / "world.sdf"
+    world.write_text(f"<sdf version='1.9'><world name='w'>{heightmap()}</world></sdf>")
+    _, _, (row,) = read_with_remedies(world, Reading(), {})
+    assert (row.uri, row.kind) == ("hill.png", MISSING) and row.words.startswith(
+        "guess level ground"
+    )
 
 
 def test_an_image_of_400_million_pixels_is_refused_before_it_is_decoded(read, tmp_path):

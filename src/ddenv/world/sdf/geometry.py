@@ -73,10 +73,10 @@ RANGE = f"sizes must be from {SMALLEST:g} to {LARGEST:g} m"
 
 @dataclass(frozen=True, kw_only=True)
 class Lost:
-    """A mesh that was not found, or is `unreadable`, and the reason; `word` is what the user wants
-    in its place, as in `StandIn`.
+    """A mesh or heightmap that was not found, or is `unreadable`, and the reason.
 
-    `scale` is its own, times that of its model.
+    `word` is what the user wants in its place, as in `StandIn`. `scale` is its own, times that of
+    its model.
     """
 
     element: Element
@@ -110,16 +110,13 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
             context.note("ignored", other, f"a <geometry> has one shape; <{element.tag}> is used")
     match element.tag:
         case "mesh":
-            return _mesh(element, parent, context, scale)
+            return _of_file(element, parent, context, scale)
         case "polyline":
             return _polyline(geometry, context, scale)
         case "empty":
             return None
-        case "heightmap" | "image" as tag:
-            if parent.tag == "visual":
-                context.note("ignored", element, f"a {tag} is not drawn")
-                return None
-            return _terrain(element, context, scale)
+        case "heightmap" | "image":
+            return _heightmap(element, parent, context, scale)
         case "plane":
             return Placed(Plane(*_sizes(element)), _turned(element.find("normal")))
     return Placed(_scaled(_primitive(element), scale, element))
@@ -151,7 +148,12 @@ def _turned(normal: Element | None) -> Pose:
     return pointing(vector(direction / length))
 
 
-def _mesh(element: Element, parent: Element, context: Context, scale: Vector) -> Placed | Lost:
+def _of_file(element: Element, parent: Element, context: Context, scale: Vector) -> Placed | Lost:
+    """What a `<mesh>` or a `<heightmap>` stands for, or what the user wants in place of its file.
+    Raises UserError.
+    """
+    if element.tag == "image":
+        raise refuse(element, "image", "an image is not supported: nothing would collide with it")
     uri = text_of(element.find("uri"))
     if not uri:
         raise complain(element, "has no <uri>")
@@ -169,17 +171,20 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
             return Lost(element=element, uri=uri, reason=reason, word=stand_in)
         context.note("replaced", element, f"'{uri}' by the stand-in {text}")
         return scaled(stand_in, scale, element)
-    submesh = element.find("submesh")
-    name = "" if submesh is None else text_of(submesh.find("name"))
-    center = submesh is not None and truth(submesh, "center", False)
     full = _times(own, scale)
-    part = MeshPart(uri, element.source.parent, name, center)
+    level = _terrain(element, np.zeros((2, 2)), full) if element.tag == "heightmap" else None
     try:
-        if parent.tag == "collision":
-            return _solid(part, element, parent, context, full)
-        mesh = context.resources.mesh(part, convex=False)
+        if level is not None:
+            return _terrain(
+                element, context.resources.heights(MeshPart(uri, element.source.parent)), full
+            )
+        return _mesh(uri, element, parent, context, full)
     except (Missing, Unusable) as error:
         word = AUTO if context.may_guess(uri) else ""
+        if word and level is not None:
+            context.guessed.append((context.model, uri))
+            context.note("replaced", element, f"'{uri}' by a guess, level ground: {error}")
+            return level
         return Lost(
             element=element,
             uri=uri,
@@ -188,33 +193,46 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
             scale=full,
             unreadable=isinstance(error, Unusable),
         )
+
+
+def _mesh(uri: str, element: Element, parent: Element, context: Context, scale: Vector) -> Placed:
+    """Raises Missing, Unusable and UserError."""
+    submesh = element.find("submesh")
+    name = "" if submesh is None else text_of(submesh.find("name"))
+    center = submesh is not None and truth(submesh, "center", False)
+    part = MeshPart(uri, element.source.parent, name, center)
+    if parent.tag == "collision":
+        return _solid(part, element, parent, context, scale)
+    mesh = context.resources.mesh(part, convex=False)
     if mesh.simplified:
         context.note(
             "replaced", element, f"'{uri}' by its convex hull, since it is too fine to be drawn"
         )
-    return Placed(_scaled(mesh, full, element))
+    return Placed(_scaled(mesh, scale, element))
 
 
-def _terrain(element: Element, context: Context, scale: Vector) -> Placed | None:
-    """The ground that a `<heightmap>` stands for; None if it is left out. Raises UserError."""
-    if context.ignores(element.tag):
-        why = "left out by --ignore: nothing collides with it"
-        context.note("ignored", element, why)
+def _heightmap(
+    element: Element, parent: Element, context: Context, scale: Vector
+) -> Placed | Lost | None:
+    """As `_of_file`; None if it is left out or not drawn."""
+    if parent.tag == "visual":
+        context.note("ignored", element, f"a {element.tag} is not drawn")
         return None
-    if element.tag == "image":
-        raise refuse(element, "image", "an image is not supported: nothing would collide with it")
-    uri = text_of(element.find("uri"))
-    if not uri:
-        raise complain(element, "has no <uri>")
-    size = _times(vector(*_sizes(element)), scale)
+    if context.ignores(element.tag):
+        context.note("ignored", element, "left out by --ignore: nothing collides with it")
+        return None
+    return _of_file(element, parent, context, scale)
+
+
+def _terrain(element: Element, shares: Floats, scale: Vector) -> Placed:
+    """The ground that a `<heightmap>` stands for: `shares` (R, C) of its height. Raises
+    UserError.
+    """
     place = element.find("pos")
-    try:
-        shares = context.resources.heights(MeshPart(uri, element.source.parent))
-    except (Missing, Unusable) as error:
-        what = "is not available" if isinstance(error, Missing) else "is unreadable"
-        raise refuse(element, "heightmap", f"heightmap '{uri[:200]}' {what}: {error}") from None
     middle = (0.0, 0.0, 0.0) if place is None else _times(vector(numbers(place, 3)), scale)
-    return _ground(uri, shares, size, middle)
+    return _ground(
+        text_of(element.find("uri")), shares, _times(vector(*_sizes(element)), scale), middle
+    )
 
 
 def _ground(uri: str, shares: Floats, size: Vector, middle: Vector) -> Placed:
@@ -294,8 +312,8 @@ def scaled(stand_in: Placed, scale: Vector, element: Element) -> Placed:
 
 
 def remedies(lost: Lost, siblings: Names) -> str:
-    """The error for a missing collision mesh, with all remedies; `siblings` are the kinds of other
-    shapes in its link.
+    """The error for a missing file of a collision, with all remedies; `siblings` are the kinds of
+    other shapes in its link.
     """
     # For model://barrel/meshes/barrel.dae name the model: one stand-in then covers all of its
     # meshes.
@@ -311,9 +329,10 @@ def remedies(lost: Lost, siblings: Names) -> str:
     # Another folder would not help if the file is there.
     folder = "" if lost.unreadable else "its folder with --model-path, "
     return (
-        f"mesh '{lost.uri[:200]}' {lost.problem}: {lost.reason}; give {folder}a shape in m with "
+        f"{lost.element.tag} '{lost.uri[:200]}' {lost.problem}: {lost.reason}; give {folder}a "
+        "shape in m with "
         f"--stand-in '{package[:200]}=cylinder:0.3,1.0' (radius, length; or {others}){also}, "
-        "have one guessed with --stand-in auto, or leave it out with --ignore mesh"
+        f"have one guessed with --stand-in auto, or leave it out with --ignore {lost.element.tag}"
     )
 
 

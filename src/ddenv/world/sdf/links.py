@@ -171,7 +171,7 @@ def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -
         raise complain(
             lost.element, f"its link has no {kind} shape that could replace '{lost.uri[:200]}'"
         )
-    if context.ignores("mesh"):
+    if context.ignores(lost.element.tag):
         why = f"'{lost.uri}' {lost.problem} ({lost.reason}): nothing collides with it"
         context.note("ignored", lost.element, why)
         return None
