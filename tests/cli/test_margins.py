@@ -203,3 +203,14 @@ def test_who_is_interrupted_reads_how_to_go_on(run, monkeypatch, command):
     command("margins", run.path)
     command("margins", run.path, "--budget", 70)
     assert asked == [Reduce(), FindMargins(most_runs=70)]
+
+
+def test_margins_and_reasons_say_whose_shapes_are_only_nearly_those_of_their_meshes(
+    run, started, command
+):
+    fake_moments.with_margins(run)
+    words = "what is left has models whose convex pieces block the floor otherwise: bin (3 pieces)"
+    assert words[1:] not in command("why", run.path).stdout.replace("\n", " ")
+    run.write("noted", about="pieces", words=words)
+    for done in (command("why", run.path), command("margins", run.path, "--jobs", 1)):
+        assert "".join(done.stdout.split()).endswith(f"W{words[1:]}.".replace(" ", ""))

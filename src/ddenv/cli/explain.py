@@ -31,6 +31,7 @@ def why_command(run: str, as_json: bool) -> int:
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.reasons import nearest, no_reasons, parting_sentence, reasons, sentence
+    from ddenv.words.claims import shape_doubts
 
     with RunFile(find_run(run)) as file:
         state = fold(file.events())
@@ -49,6 +50,8 @@ def why_command(run: str, as_json: bool) -> int:
         say(passing.sentences)
     if not found and certificate is not None:
         say(no_reasons(certificate))
+    for words in shape_doubts(state):
+        say(words)
     return 0
 
 
@@ -174,6 +177,7 @@ def margins_command(
     from ddenv.runs.engine_job import MOST_RUNS, EngineOptions, FindMargins, Job, Reduce
     from ddenv.runs.experiment import read_parts
     from ddenv.runs.programs import last_words, start_engine
+    from ddenv.words.claims import shape_doubts
     from ddenv.words.margins import lines, rows
 
     path, state = idle_run(run, trust, cluster)
@@ -201,7 +205,8 @@ def margins_command(
             announce(f"interrupted; all runs are kept; continue with: ddenv margins {path}")
             return 130
     with RunFile(path) as file:
-        margins = fold(file.events()).margins
+        state = fold(file.events())
+    margins = state.margins
     if margins is None or margins.broken_off:
         raise UserError(last_words(path))
     if not margins.ended:
@@ -213,5 +218,5 @@ def margins_command(
         fixes = [asdict(one) for one in fixes_of(margins)]
         print(json.dumps({"margins": found, "fixes": fixes, "certified": margins.asked.certified}))
     else:
-        print("\n".join(lines(margins)))
+        print("\n".join((*lines(margins), *shape_doubts(state))))
     return 0

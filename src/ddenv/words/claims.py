@@ -27,6 +27,7 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import stack_with
 from ddenv.text import (
     Sentences,
+    as_sentence,
     between,
     count,
     first_of,
@@ -557,6 +558,11 @@ def smaller_known(state: RunState) -> str:
         return ""
     size, where = min((*nodes, *trials), key=lambda each: each[0])
     return f"a smaller environment is known to show f: {count(size, 'model')} ({where})"
+
+
+def shape_doubts(state: RunState) -> Sentences:
+    """On models that are left, and whose shapes are only nearly those of their meshes."""
+    return tuple(as_sentence(words) for about, words in state.notes if about == "pieces")
 
 
 def missing(state: RunState) -> str:

@@ -24,6 +24,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.folder import attach_name
 from ddenv.runs.playback import played
 from ddenv.text import plain, shortened
+from ddenv.words.claims import shape_doubts
 from ddenv.words.margins import BAR_WORDS, bar, nearest_fix, rows, sureness
 from ddenv.workbench.help.dialogs import Reading
 from ddenv.workbench.help.footer import KeyFooter
@@ -254,7 +255,8 @@ class WhyScreen(Screen[None]):
         if one is None:
             return
         ways, lacks = self._ways(one)
-        self.query_one("#why-said", Static).update(said(one, lacks))
+        doubts = (*lacks, *shape_doubts(self._state))
+        self.query_one("#why-said", Static).update(said(one, doubts))
         self.query_one("#why-scroll").scroll_home(animate=False)
         self.map.show(one.snapshot, without(one.snapshot.state.environment, one.gone))
         parting = None if one.parting is None else one.parting.place
@@ -340,6 +342,7 @@ class MarginsDialog(Reading):
                 f"now {now}; f until {until};{'' if goal == '-' else f' then {goal};'} {runs} runs"
             )
             lines += [(shortened(name, 24), bar(one.margin, 41)), ("", words)]
-        means = [("", plain(words)) for words in (nearest_fix(known), sureness(known), BAR_WORDS)]
+        sentences = (nearest_fix(known), sureness(known), BAR_WORDS, *shape_doubts(state))
+        means = [("", plain(sentence)) for sentence in sentences]
         title = "How far each number can change before f disappears"
         super().__init__("Margins", [(title, lines), ("What this means", means)])
