@@ -32,6 +32,7 @@ from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.guide import begin_search, make_guide
 from ddenv.reduction.round import Partition, Round, Rounds, Stacks
 from ddenv.reduction.verdict import Acceptance
+from ddenv.robot.drake.terrain_boxes import note_terrain
 from ddenv.robot.settled import notes_on
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest
@@ -762,7 +763,10 @@ class Driver:
     def _end(self, minimal: bool, reason: str) -> None:
         self._scheduler.finish_trials()
         left = self._journal.state.environment
-        for about, words in (*note_unseen(self._world, left), *note_pieces(self._world, left)):
+        unlike = [*note_unseen(self._world, left), *note_pieces(self._world, left)]
+        if self._scenario.oracle is None:
+            unlike += note_terrain(self._world, self._scenario, left)
+        for about, words in unlike:
             note(self._journal, about, f"what is left has {words}")
         # Tests of later candidates are no longer needed.
         self._journal.lose_running()

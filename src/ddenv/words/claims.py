@@ -561,8 +561,9 @@ def smaller_known(state: RunState) -> str:
 
 
 def shape_doubts(state: RunState) -> Sentences:
-    """On models that are left, and whose shapes are only nearly those of their meshes."""
-    return tuple(as_sentence(words) for about, words in state.notes if about == "pieces")
+    """On models that are left, and whose shapes are only nearly those of their files."""
+    doubts = (words for about, words in state.notes if about in ("pieces", "terrain"))
+    return tuple(map(as_sentence, doubts))
 
 
 def missing(state: RunState) -> str:

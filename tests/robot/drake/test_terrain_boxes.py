@@ -5,6 +5,7 @@ one box is.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 
 from ddenv.robot.drake import terrain_boxes
 from ddenv.robot.drake.region import Region
-from ddenv.robot.drake.terrain_boxes import MOST, TOLERANCES, boxes
+from ddenv.robot.drake.terrain_boxes import MOST, TOLERANCES, boxes, note_terrain
 from ddenv.robot.result import RunResult
 from ddenv.robot.simulation.plant_cache import Plant, PlantCache
 from ddenv.world.model import Box, Shape, Terrain, World
@@ -85,6 +86,23 @@ def test_level_and_tilted_ground_is_one_box_and_a_region_takes_some_of_the_same_
     some = list(boxes(terrain_of(hills), HERE, region, 0.01))
     assert 0 < len(some) < len(everything) / 2
     assert [one for one in everything if one in some] == some
+
+
+def test_terrain_that_is_too_fine_for_its_boxes_is_noted(world_of, scenario_of):
+    def noted(height: Callable[[np.ndarray, np.ndarray], np.ndarray], *kept: str) -> list:
+        shapes = {"hill": terrain_of(height), "slope": terrain_of(lambda x, _: 2.0 * x)}
+        links = {name: link_of("link", shape, HERE, None) for name, shape in shapes.items()}
+        models = tuple(model_of(name, link) for name, link in links.items())
+        world = replace(world_of(ground=False), models=models)
+        return list(note_terrain(world, scenario_of(), kept))
+
+    random = np.random.default_rng(4)
+    words = r"boxes in place of hill, up to 0\.\d\d m off its surface"
+    ((about, said),) = noted(lambda x, _: random.uniform(0.0, 0.5, x.shape), "hill", "slope")
+    assert about == "terrain" and re.fullmatch(words, said)
+    # Each is a tile, which may be gone; and smooth hills, or a steep slope, are met exactly.
+    assert noted(lambda x, _: random.uniform(0.0, 0.5, x.shape), "slope") == []
+    assert noted(hills, "hill", "slope") == []
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ wanted.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from itertools import islice
 
@@ -16,14 +16,16 @@ import numpy as np
 
 from ddenv.arrays import Floats
 from ddenv.robot.drake.region import Region
-from ddenv.world.model import Box, Collision, Model, Terrain
+from ddenv.world.model import Box, Collision, Model, Terrain, World
 from ddenv.world.pose import Pose, pointing, vector
+from ddenv.world.scenario import Scenario
 from ddenv.world.terrain import bilinear, height_at
 
 # How far the surface may be from the boxes, m: the first of these with which at most `MOST` boxes
 # stand around the robot's way, or the last. More boxes would take too much memory.
 TOLERANCES = tuple(0.01 * 2 ** (number / 2) for number in range(16))
 MOST = 1200
+COARSE = 0.02  # boxes that are farther off are worth a note, m
 FINEST = 1 / 16  # the width of the smallest part, in cells of the grid
 THICKNESS = 0.2  # of a box, m
 CORNERS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
@@ -53,13 +55,39 @@ def _parts(collision: Collision, region: Region | None, way: Region) -> list[Col
     terrain = collision.shape
     if not isinstance(terrain, Terrain):
         return [collision]
-    for tolerance in TOLERANCES:
-        if len(list(islice(boxes(terrain, collision.pose, way, tolerance), MOST + 1))) <= MOST:
-            break
+    tolerance = _tolerance(terrain, collision.pose, way)
     return [
         replace(collision, shape=box, pose=pose)
         for box, pose in boxes(terrain, collision.pose, region, tolerance)
     ]
+
+
+def _tolerance(terrain: Terrain, place: Pose, way: Region) -> float:
+    """How far the surface of terrain at `place` may be from its boxes, m."""
+    for tolerance in TOLERANCES:
+        if len(list(islice(boxes(terrain, place, way, tolerance), MOST + 1))) <= MOST:
+            break
+    return tolerance
+
+
+def note_terrain(
+    world: World, scenario: Scenario, among: Collection[str]
+) -> Iterator[tuple[str, str]]:
+    """Which ground, or terrain of `among`, is too fine for its boxes on the robot's way."""
+    spawn = scenario.robot.spawn
+    goal = scenario.goal
+    way = Region.of((spawn.x, spawn.y), (goal.x, goal.y), ())
+    there = world.ground.union(among)
+    for model in (each for each in world.models if each.name in there):
+        for one in model.collisions:
+            if not isinstance(one.shape, Terrain):
+                continue
+            off = _tolerance(one.shape, one.pose, way)
+            if off > COARSE:
+                yield (
+                    "terrain",
+                    f"boxes in place of {model.name}, up to {off:.2f} m off its surface",
+                )
 
 
 def boxes(

@@ -83,13 +83,21 @@ def _error(model: str, pieces: list[tuple[Piece, Collision]]) -> FloorError:
 
 
 def note_pieces(world: World, among: Collection[str]) -> Iterator[tuple[str, str]]:
-    """Which `among` these models block the floor clearly otherwise than their meshes do."""
+    """Which `among` these models block the floor clearly otherwise than their meshes do, or are not
+    compared with these.
+    """
     wrong = [
         f"{note.model} (its hull: {UNCUT})"
         for note in world.notes
         if UNCUT in note.why and note.model in among
     ]
-    for error in floor_errors(model for model in world.models if model.name in among):
+    there = [model for model in world.models if model.name in among]
+    for model in there:
+        cut = [one.piece for one in model.collisions if one.piece is not None]
+        fine = sum(piece.mesh.simplified for piece in cut)
+        if fine:
+            wrong.append(f"{model.name} ({fine} pieces: perhaps; its mesh is too fine to compare)")
+    for error in floor_errors(there):
         most = max(error.blocked, error.free)
         if most > LARGE and most * error.floor > LARGE_AREA:
             shares = f"{100 * error.blocked:.0f} % too much, {100 * error.free:.0f} % too little"
