@@ -107,6 +107,7 @@ def world_report(world: World) -> Data:
     from ddenv.world.sdf.official import refused
 
     removable = frozenset(world.elements())
+    ground = world.ground
     models = []
     for model in world.models:
         box = model_bounds(model)
@@ -117,7 +118,7 @@ def world_report(world: World) -> Data:
         models.append(
             {
                 "name": model.name,
-                "kind": _kind(world, model),
+                "kind": _kind(model, ground),
                 "removable": model.name in removable,
                 "line": model.line,
                 "pose": [*model.pose.position, *model.pose.quaternion],
@@ -167,8 +168,8 @@ def _notes(world: World, *models: str) -> list[dict[str, str]]:
     ]
 
 
-def _kind(world: World, model: Model) -> str:
-    if model.name in world.ground:
+def _kind(model: Model, ground: frozenset[str]) -> str:
+    if model.name in ground:
         return "ground"
     if model.static:
         return "static"
@@ -272,12 +273,13 @@ def _table(world: World, notes: Mapping[str, Iterable[str]], columns: int | None
 
     from ddenv.world.extent import center, model_bounds
 
+    ground = world.ground
     found = []
     for model in world.models:
         box = model_bounds(model)
         cells = (
             shortened(model.name, LONGEST_NAME),
-            _kind(world, model),
+            _kind(model, ground),
             str(len(model.links)),
             ", ".join(f"{number} {shape}" for shape, number in _shapes(model).items()) or "none",
             "" if box is None else " x ".join(f"{part:.2f}" for part in box[1] - box[0]),

@@ -1,8 +1,10 @@
 """The setup screen opens worlds without a scenario."""
 
+import fake_run
 import pytest
 from textual.widgets import Input, OptionList, Static
 
+from ddenv.runs.engine_job import Reduce
 from ddenv.runs.preferences import state_file
 from ddenv.runs.remedies import REMEDIES, remembered
 from ddenv.workbench.map.world_map import WorldMap
@@ -45,7 +47,7 @@ async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
         assert list(runs.iterdir()) == []
         session.fill(spawn_z="0.16")
         await session.press("ctrl+s")
-        assert started == [("crates-1.ddenv", 4, {"accept_mode": "automatic", "attended": "yes"})]
+        assert started == [("crates-1.ddenv", fake_run.attended(4), Reduce())]
 
 
 @pytest.mark.screens
