@@ -1,8 +1,7 @@
 """Runs the robot in random parts of worlds, each seed both ways: with early stop, and to the end.
 
-    python benchmarks/early_stop.py [--scenario ditch] [--world FILE:SPAWN:GOAL ...] [--environments
-    N] [--seeds S]
-                                    [--seconds N] [--jobs N]
+    python benchmarks/early_stop.py [--scenario ditch] [--world FILE:SPAWN:GOAL ...]
+                                    [--environments N] [--seeds S] [--seconds N] [--jobs N]
 
 A world is any SDF file, with x,y,z,yaw of the start and x,y of the goal:
 `arena.world:-8,0,0.4,0:7.5,0.5`. What it lacks is stood in for; `--model-path` has folders with

@@ -2,8 +2,8 @@
 take no part.
 
     python benchmarks/reductions.py [--scenarios ditch,friction] [--pairs paper] [--search-only]
-    [--jobs N] [SETTING=VALUE ...] python benchmarks/reductions.py --models 500,5000 --pairs own
-    [--jobs N] [--keep FOLDER]
+                                    [--jobs N] [SETTING=VALUE ...]
+    python benchmarks/reductions.py --models 500,5000 --pairs own [--jobs N] [--keep FOLDER]
 
 An engine reduces each world. *Search* counts the tests that it simulates, the baseline included and
 the certificate apart; *all* the certificate, too. *CPU* is the time of all processes, *memory* the
@@ -138,10 +138,8 @@ def row(scenario: Scenario, done: Reduced) -> str:
     certified = "certified" if state.certified else f"{state.status}, {state.reason}"
     return (
         f"| {scenario.name} | {scenario.reduction.pair} | {len(state.elements):,} | "
-        f"{len(sliced(state))} "
-        f"| {len(state.environment)} {certified} | {simulated(state)} | {every} | {done.cpu:.0f} "
-        f"| {done.clock:.0f} "
-        f"| {done.memory / 1e6:.0f} |"
+        f"{len(sliced(state))} | {len(state.environment)} {certified} | {simulated(state)} | "
+        f"{every} | {done.cpu:.0f} | {done.clock:.0f} | {done.memory / 1e6:.0f} |"
     )
 
 

@@ -1,10 +1,11 @@
-"""Whether a run really repeats where what took no part in it is removed: simulates tests that a
-finished run implies.
+"""Whether a run really repeats where models that did not affect it are removed: simulates tests
+that a finished run implies.
 
-    python benchmarks/slices.py [--worlds N] [--tests N] [--from NUMBER] python benchmarks/slices.py
-    ditch|friction|rubble [--seconds S] [--tests N] python benchmarks/slices.py WORLD --spawn
-    X,Y,Z,YAW --goal X,Y [--stand-in URI=SHAPE] [--inside] [--seconds S] [--tests N] python
-    benchmarks/slices.py ... --forget KIND
+    python benchmarks/slices.py [--worlds N] [--tests N] [--from NUMBER]
+    python benchmarks/slices.py ditch|friction|rubble [--seconds S] [--tests N]
+    python benchmarks/slices.py WORLD --spawn X,Y,Z,YAW --goal X,Y [--stand-in URI=SHAPE]
+                                [--inside] [--seconds S] [--tests N]
+    python benchmarks/slices.py ... --forget KIND
 
 Without a name: small random worlds (`small_worlds.py`), N of each kind. Of each world, random parts
 run, and then random parts of these that keep what took part and break no tie. Every bit must be the

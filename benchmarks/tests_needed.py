@@ -1,8 +1,8 @@
 """How many tests each algorithm and each pair needs, compared with the bound and with picire's
 ddmin.
 
-    python benchmarks/tests_needed.py [--worlds N] [--large-worlds N] [--jobs N] [--only
-    algorithms|pairs]
+    python benchmarks/tests_needed.py [--worlds N] [--large-worlds N] [--jobs N]
+                                      [--only algorithms|pairs]
 
 Random worlds without a robot: n models on 20 x 20 m; the failure needs k of them. The chance to be
 needed falls with the distance to the place of the failure, by a factor of e every 2 m. The oracle

@@ -1,8 +1,8 @@
 """Draws the README's picture: a reduction from its run file, candidate by candidate, as one
 animated SVG.
 
-    ddenv run friction --no-slice --output friction.ddenv && python docs/animation.py friction.ddenv
-    docs/reduction.svg
+    ddenv run friction --no-slice --output friction.ddenv
+    python docs/animation.py friction.ddenv docs/reduction.svg
 
 Each picture shows one candidate: the models it keeps, and the robot's path in its last test.
 """

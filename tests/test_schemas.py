@@ -168,8 +168,7 @@ def test_another_packages_schema_is_listed_explained_and_used(plugin):
         "False True",
         (
             "Partitions are tried by the last letter of their first model's name. It only shows "
-            "how "
-            "it is done. False"
+            "how it is done. False"
         ),
         "('c',)",
         # All at first, the five that go, c in vain, and c again when it is alone.

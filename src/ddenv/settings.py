@@ -223,8 +223,8 @@ class Reduction:
     accept_rate: Literal["first", "kept", "exact"] = setting(
         "kept",
         "when a candidate is accepted: at its first run with f (first), at a run with f if all "
-        "its runs fit the rate of f (kept), "
-        "or if a failing run of the baseline, replayed with its seed, still shows f (exact)",
+        "its runs fit the rate of f (kept), or if a failing run of the baseline, replayed with "
+        "its seed, still shows f (exact)",
         printed="first",
         shown="more",
         may_change=True,
@@ -327,8 +327,7 @@ class Reduction:
         "implied",
         (
             "which candidates are skipped: sets judged before (known), or also sets without a "
-            "group "
-            "that was needed before (implied)"
+            "group that was needed before (implied)"
         ),
         printed="known",
         used_by=("ddenv",),
@@ -343,8 +342,7 @@ class Reduction:
         "paper",
         (
             "each complement after its part (paper), or first those without the models farthest "
-            "away "
-            "(far-first)"
+            "away (far-first)"
         ),
         printed="paper",
         used_by=("ddenv",),
@@ -410,8 +408,7 @@ class Simulation:
         None,
         (
             "maximum real time of one test without its preparation; by default 1800 in the "
-            "baseline, "
-            "then set by its speed"
+            "baseline, then set by its speed"
         ),
         unit="s",
         least=0.01,

@@ -49,9 +49,9 @@ def test_a_result_with_a_certificate_says_what_can_be_done_with_it(run, home):
     elsewhere = summary_lines(state, run.path)[-1]
     assert elsewhere.startswith(f"next: 'ddenv open {run.path}' shows it")
     assert summary_lines(state, runs_folder() / "crates-1.ddenv")[-1] == (
-        "next: 'ddenv open crates-1' shows it, 'ddenv why crates-1' says why it fails, "
-        "'ddenv isolate crates-1' finds a nearest world that passes, "
-        "'ddenv export crates-1 --bundle crates-1.zip' packs it for others"
+        "next: 'ddenv open crates-1' shows it, 'ddenv why crates-1' says why it fails, 'ddenv "
+        "isolate crates-1' finds a nearest world that passes, 'ddenv export crates-1 --bundle "
+        "crates-1.zip' packs it for others"
     )
     assert not any(
         line.startswith("next:")

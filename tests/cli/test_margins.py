@@ -16,13 +16,11 @@ from tests.workbench import fake_moments
 
 FRICTION = (
     "crate_00.friction (0.1): f down to 0 (5 of 5 runs), the end of its range; f up to 0.2 (5 of "
-    "5 runs), the robot "
-    "reaches its goal at 0.4 (7 of 7 runs)"
+    "5 runs), the robot reaches its goal at 0.4 (7 of 7 runs)"
 )
 FIX = (
     "The nearest fix found: crate_00.friction from 0.1 to 0.4, 33 % of its scale; the robot "
-    "reaches its goal in 20 of 20 "
-    "fresh runs"
+    "reaches its goal in 20 of 20 fresh runs"
 )
 
 

@@ -59,8 +59,7 @@ def test_runs_in_another_simulator_are_compared_with_the_certificate():
     assert lines(summary(many), {each["without"]: each["said"] for each in found}) == [
         (
             "fails in MuJoCo, too: f in 18 of 20 runs (70 % to 97 %); by its certificate f in 29 "
-            "of "
-            "29 fresh runs (88 % to 100 %)"
+            "of 29 fresh runs (88 % to 100 %)"
         ),
         "ball: needed in MuJoCo, too: without it f in 0 of 8 runs (0 % to 32 %); 1 more run broke",
         "wall: not shown for MuJoCo: without it f in 0 of 1 run (0 % to 79 %)",

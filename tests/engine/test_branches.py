@@ -141,8 +141,8 @@ def test_an_end_above_a_smaller_environment_that_showed_f_says_so(tmp_path):
     said = smaller_known(state)
     undone = next(node for node in state.nodes if node.rejected)
     assert said == (
-        f"a smaller environment is known to show f: 1 model (#{undone.number} in the "
-        "history, taken back)"
+        f"a smaller environment is known to show f: 1 model (#{undone.number} in the history, "
+        "taken back)"
     )
     assert said in ended(state)
     assert smaller_known(drive(new_run(tmp_path), FakePool(needs("wall"), 1))) == ""

@@ -1,5 +1,5 @@
-"""Slices: a test that a finished run implies is not made, what took no part goes without one, and
-audits find what is wrong.
+"""Slices: a test that a finished run implies is not made, models that did not affect a run go
+without one, and audits find what is wrong.
 """
 
 import tempfile

@@ -56,9 +56,8 @@ def test_two_failures_within_epsilon_are_named_and_none_takes_the_place_of_the_o
     assert not state.minimal
     assert verdict_on(certificate).startswith(
         "what is left may show another failure within epsilon: of the runs of the whole world "
-        "with f 6 of 10 ended in one place, "
-        f"of what is left 0 of {runs} did, and others ended 0.3 m away; --epsilon 0.15 tells "
-        "them apart; "
+        f"with f 6 of 10 ended in one place, of what is left 0 of {runs} did, and others ended "
+        "0.3 m away; --epsilon 0.15 tells them apart; "
     )
 
 

@@ -106,12 +106,10 @@ def test_a_finished_run_in_a_few_words(run, tmp_path):
     report = content(read_run(run.path))
     # How long it took to write its events depends on the machine.
     assert re.sub(r"\d+ s of", "0 s of", "".join(map(words, report.lead[0].parts))) == (
-        "In short: The robot got stuck before it reached its goal. Of the 11 models in its "
-        "world, 2 are enough to make it "
-        "fail this way: crate_00, crate_01. It failed like this in 23 of 23 new runs with "
-        "nothing else there (80 % to 100 % of "
-        "all runs, with 95 % confidence); with any one of them removed, in at most 1 of 12 (at "
-        "most 49 %). This took 83 simulated "
+        "In short: The robot got stuck before it reached its goal. Of the 11 models in its world, "
+        "2 are enough to make it fail this way: crate_00, crate_01. It failed like this in 23 of "
+        "23 new runs with nothing else there (80 % to 100 % of all runs, with 95 % confidence); "
+        "with any one of them removed, in at most 1 of 12 (at most 49 %). This took 83 simulated "
         "runs and 0 s of computing time."
     )
     titles = [section.title for section in report.sections]

@@ -1,5 +1,5 @@
-"""Events to state: what is told of tests and candidates is right, and no state is ever changed by a
-later event.
+"""Events to state: what a state says of tests and candidates is right, and no state is ever changed
+by a later event.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""The run file: what is in it stays, and what is no run file is told."""
+"""The run file: what is in it stays, and another file is refused."""
 
 import json
 import sqlite3

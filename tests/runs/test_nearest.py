@@ -18,10 +18,9 @@ def test_it_says_what_goes_and_what_fresh_runs_show_with_and_without_it(run):
     assert found.gone == removed_in_passing(state, run.path) == ("crate_00",)
     assert found.shown
     assert found.words == (
-        "a nearest world that passes lacks 1 model of 11 (crate_00): without it the robot "
-        "reaches its goal in 20 of 20 fresh "
-        "runs (84 % to 100 %), tested above 45 %; with it put back in 0 of 9 fresh runs (0 % to "
-        "30 %)"
+        "a nearest world that passes lacks 1 model of 11 (crate_00): without it the robot reaches "
+        "its goal in 20 of 20 fresh runs (84 % to 100 %), tested above 45 %; with it put back in "
+        "0 of 9 fresh runs (0 % to 30 %)"
     )
     # The reduction is as it was.
     assert (state.status, state.minimal, state.certified) == ("finished", True, True)

@@ -127,8 +127,7 @@ def test_steps_back_are_counted_with_all_their_tests(tmp_path, cell, run):
             {None: ("not shown", "sssp")},
             (
                 "not shown that what is left keeps 66 % of the whole world's rate; it keeps at "
-                "least "
-                "9 %: f in 3 of 4"
+                "least 9 %: f in 3 of 4"
             ),
         ),
         (holds(LEFT) | {"crate_01": ("not shown", "sppp")}, "undecided without crate_01"),

@@ -1,4 +1,4 @@
-"""The file with a user's keys and theme: what it can say, and that whatever is wrong in it is told
+"""The file with a user's keys and theme: what it can say, and that an error in it is reported
 in one line.
 """
 

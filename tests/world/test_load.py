@@ -1,4 +1,4 @@
-"""Scenarios: what is wrong is told with file, key, value and what is allowed."""
+"""Scenarios: an error names file, key, value and what is allowed."""
 
 import pytest
 import yaml

@@ -351,9 +351,8 @@ AT_A_PLACE: dict[str, dict[str, list[bytes]]] = {
     },
     "`<include merge='true'>` in a world": {
         (
-            "merge='true' puts the links of a model into the model around it; here is none; "
-            "leave it "
-            "out with --ignore"
+            "merge='true' puts the links of a model into the model around it; here is none; leave "
+            "it out with --ignore"
         ): [world("<include merge='true'><uri>model://nowhere</uri></include>")]
     },
     "includes in a cycle": {"form a cycle": [world(include("hostile.world"))]},

@@ -74,7 +74,8 @@ def run_command(
         given["accept_rate"] = "exact"
     path, world = create_named(scenario, given, asking(trust), name, output, announce)
     announce_notes(world, as_json)
-    code, state = follow_to_summary(path, start_engine(path, EngineOptions(jobs=jobs)), as_json)
+    engine = start_engine(path, EngineOptions(jobs=jobs))
+    code, state = follow_to_summary(path, engine, as_json)
     if output is not None and is_world(output) and state.baseline is not None:
         announce_needs(output, export_world(path, output, None).needs)
     return code

@@ -299,8 +299,8 @@ class Driver:
         ):
             raise UserError(
                 f"reduction.accept_rate: exact needs runs that repeat, but run {test.run + 1} of "
-                "the whole world, replayed "
-                f"with seed {test.seed}, differs; keep its rate: --accept-rate kept"
+                f"the whole world, replayed with seed {test.seed}, differs; keep its rate: "
+                "--accept-rate kept"
             )
 
     def _nodes(self, node: int) -> tuple[Node, ...]:
@@ -544,8 +544,8 @@ class Driver:
                 return
         last = max(test.id for test in shown)
         raise UserError(
-            f"f does not repeat: it showed only in the first {count(last, 'run')}, "
-            f"and in none of {count(replays, 'replay')}; {LEFT_OVER}"
+            f"f does not repeat: it showed only in the first {count(last, 'run')}, and in none of "
+            f"{count(replays, 'replay')}; {LEFT_OVER}"
         )
 
     def search_ended(self, environment: Environment) -> None:

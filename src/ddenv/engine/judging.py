@@ -273,10 +273,9 @@ def _no_failure(tests: Sequence[Test]) -> str:
     # One that shows more often than this would have shown with a chance of 95 %.
     below = percent_at_most(1.0 - 0.05 ** (1.0 / reached))
     return (
-        f"the robot reached its goal in all {reached} baseline runs{also}: there is no failure "
-        "to reduce; if there is one, it "
-        f"shows in less than {below} of all runs (95 %): --baseline-runs {FURTHER * reached} "
-        "looks further"
+        f"the robot reached its goal in all {reached} baseline runs{also}: there is no failure to "
+        f"reduce; if there is one, it shows in less than {below} of all runs (95 %): "
+        f"--baseline-runs {FURTHER * reached} looks further"
     )
 
 

@@ -223,10 +223,9 @@ class TestScheduler:
                 how = "gives a different trajectory"
             raise UserError(
                 f"{run}: repeated, the first run of the whole world {how}: the tests were made "
-                f"with {state.physics.proven}, and "
-                f"this is {state.physics.now}; 'ddenv resume {run} --mixed' continues anyway, "
-                f"'ddenv resume {run} --again' "
-                "repeats all tests in a new run"
+                f"with {state.physics.proven}, and this is {state.physics.now}; 'ddenv resume "
+                f"{run} --mixed' continues anyway, 'ddenv resume {run} --again' repeats all tests "
+                "in a new run"
             )
         self._journal.record(Compared(same=result is None))
 

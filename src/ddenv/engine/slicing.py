@@ -150,7 +150,7 @@ def repeats(journal: Journal, audit: Test) -> bool:
         return True
     state = journal.state
     source = state.test(audit.audits)
-    # What took no part may have moved by itself.
+    # Models that did not affect a run may have moved by themselves.
     gone = (state.environments[0] - state.environments[audit.environment]).names(state.elements)
     first = {
         name: rows for name, rows in journal.file.motions(source.id).items() if name not in gone

@@ -1,9 +1,9 @@
 """Slices: what is known of a run because nothing that it lacks took part in another one.
 
-Tests share their seeds, and a simulation repeats bit for bit where what took no part in it is
-removed. So a finished run of models E1 implies the run of E2 with the same seed if E2 is a part of
-E1, has all that took part, and breaks no tie. It implies nothing for other seeds. In programs this
-is dynamic slicing.
+Tests share their seeds, and a simulation repeats bit for bit where models that did not affect it
+are removed. So a finished run of models E1 implies the run of E2 with the same seed if E2 is a part
+of E1, has all that took part, and breaks no tie. It implies nothing for other seeds. In programs
+this is dynamic slicing.
 
 Who uses this keeps to three rules, so that neither workers nor kills change a result:
 

@@ -683,9 +683,8 @@ class AcceptOther(Asked):
             said = f"a branch reduces the failure of test {test.id}, from {models} on"
             then = (
                 "Reduce this failure instead of f? The run branches: these models become the "
-                "environment, and only this failure "
-                "counts as f in the branch. Going back in the history (h) restores f and "
-                "everything found for it."
+                "environment, and only this failure counts as f in the branch. Going back in the "
+                "history (h) restores f and everything found for it."
             )
         else:
             brief = "count another failure as f"

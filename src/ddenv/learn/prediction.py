@@ -168,8 +168,7 @@ def _winner(position: Position, moment: Moment) -> Foretelling | None:
         tuple(answers),
         (
             "The first candidate that has everything f needs wins. 'part A' is A alone, 'without "
-            "A' "
-            "is all the rest."
+            "A' is all the rest."
         ),
     )
     if round.winner is None:

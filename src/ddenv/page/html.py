@@ -99,10 +99,9 @@ def _table(table: Table) -> str:
             for side, cell in zip(sides, row, strict=True)
         )
         rows.append(f"<tr{strong}>{''.join(cells)}</tr>\n")
-    return (
-        "<div "
-        f'class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{"".join(rows)}</tbody></table></div>'
-    )
+    body = "".join(rows)
+    markup = f"<table><thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table>"
+    return f'<div class="table">{markup}</div>'
 
 
 def _part(part: Part) -> str:

@@ -167,8 +167,8 @@ def reduce(
     """Finds a few of `elements` with which `test` still shows the failure; the best end is one of
     which no single one can go.
 
-        ddenv.reduce("abcdef", lambda kept: kept >= {"a", "e"}, algorithm="ddmin").kept  # ("a",
-        "e")
+        found = ddenv.reduce("abcdef", lambda kept: kept >= {"a", "e"}, algorithm="ddmin")
+        found.kept  # ("a", "e")
 
     `test(frozenset of names)` runs the robot, or anything else, with these elements alone, and
     returns whether the failure showed. A few calls with all elements, and at the end with what is
@@ -529,9 +529,8 @@ class _Caller:
         if LONGER * likely > self.most_tests:
             warnings.warn(
                 f"the failure shows in about {percent(rate)} of the calls: to certify what is "
-                "left takes "
-                f"about {rounded(likely):,} of them, and most_tests allows {self.most_tests:,}; "
-                "it may end not shown",
+                f"left takes about {rounded(likely):,} of them, and most_tests allows "
+                f"{self.most_tests:,}; it may end not shown",
                 stacklevel=2,
             )
 

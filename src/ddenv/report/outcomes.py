@@ -96,8 +96,7 @@ def _baseline(state: RunState) -> list[Block]:
         f = {row for row, one in enumerate(base.seen) if one.test == base.failure_test}
         words = (
             "The whole world shows several failures. The run began with the one in bold as f; "
-            "--failure NUMBER reduces "
-            "another one."
+            "--failure NUMBER reduces another one."
         )
         words += (
             f" The first {count(base.chose, 'run')} only chose it, and are not in its rate."

@@ -72,7 +72,7 @@ class Node:
     `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did), "accepted" (the
     user accepted another failure, too), "instead" (from here on another failure is f), "certified"
     (its certificate showed that one more model can go), "left_out" (the user left out one that only
-    helped) or "sliced" (what went took no part in the runs `sliced_by`); `what` names the
+    helped) or "sliced" (what went did not affect the runs `sliced_by`); `what` names the
     candidate, trial or test. `tests` is the number of tests finished by then, `own_tests` of them
     were made on the way to it, not for other branches; `time` is Unix time, s, `round` the round
     that ended in it. `evidence_test` is the run in it that guides the next rounds, None before f is

@@ -228,8 +228,7 @@ def check_cluster(cluster: str) -> None:
     if not (SCHEDULER.fullmatch(cluster) or hosts_of(cluster) or is_file(Path(cluster))):
         raise UserError(
             "options: reduction.cluster: expected here, tcp://HOST:PORT, tls://HOST:PORT, "
-            "ssh:HOST1,HOST2 or the path of a "
-            f"scheduler file that is there, found '{cluster}'"
+            f"ssh:HOST1,HOST2 or the path of a scheduler file that is there, found '{cluster}'"
         )
     if find_spec("distributed") is None:
         raise UserError(

@@ -95,7 +95,9 @@ class Cell:
 
     @property
     def slices(self) -> bool:
-        """Whether it removes what took no part without a test; the paper's way is without."""
+        """Whether it removes, without a test, models that did not affect a run; the paper does
+        not.
+        """
         return self.scenario.reduction.slice
 
     @property

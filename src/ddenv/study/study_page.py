@@ -109,14 +109,11 @@ def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Para
     shares = sorted({result.cell.scenario.reduction.certify_rate for result in results})
     yield say(
         "A robot fails in a world of many models. Each cell of this study reduces such a world, "
-        "by one method, to the few "
-        "models that make the robot fail: it runs smaller and smaller parts, keeps those that "
-        "show the same failure f, and "
-        "stops when no single model can be left out. Runs with fresh seeds then check the "
-        "result: it is certified if "
-        f"it keeps at least {' or '.join(map(percent_at_least, shares))} of the whole world's "
-        "failure rate, and less without "
-        "any one of its models."
+        "by one method, to the few models that make the robot fail: it runs smaller and smaller "
+        "parts, keeps those that show the same failure f, and stops when no single model can be "
+        "left out. Runs with fresh seeds then check the result: it is certified if it keeps at "
+        f"least {' or '.join(map(percent_at_least, shares))} of the whole world's failure rate, "
+        "and less without any one of its models."
     )
     beside = [
         (result, paper) for result in minimal if (paper := paper_row(result.cell)) is not None
@@ -130,11 +127,9 @@ def _lead(results: Sequence[Result], minimal: Sequence[Result]) -> Iterator[Para
         )
         yield say(
             f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much "
-            f"removed in {better}, no more "
-            f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take "
-            f"{ours}, and the certificates {more}. "
-            "The worlds and the simulator differ from the paper's: compare the methods with each "
-            "other."
+            f"removed in {better}, no more tests in {fewer}. They took {hours:.0f} hours there; "
+            f"here the searches take {ours}, and the certificates {more}. The worlds and the "
+            "simulator differ from the paper's: compare the methods with each other."
         )
     if missing := len(results) - len(minimal):
         yield say(f"{count(missing, 'cell')} not certified: the tables say why.", notice=True)
@@ -277,7 +272,7 @@ def _computed(results: Sequence[Result]) -> Iterator[Block]:
         yield say(f"Different versions computed parts of it: {'; '.join(versions)}.", notice=True)
     if taken:
         yield say(
-            f"{thousands(taken)} tests were reused from another cell with the same models and "
-            "the same seed: the simulation is "
-            "deterministic to the last bit. They count in each cell, including their time."
+            f"{thousands(taken)} tests were reused from another cell with the same models and the "
+            "same seed: the simulation is deterministic to the last bit. They count in each "
+            "cell, including their time."
         )

@@ -49,13 +49,11 @@ MOST_CELLS = 3
 FEWEST = 4
 BOUNDS = (
     "Search tests, the baseline included; certificates cost about the same after each method. "
-    "Ranked by the ratio of tests to "
-    "the bound (geometric mean over the scenarios); a method that is not certified with every "
-    "seed is not ranked. No "
-    "search needs fewer tests: after the baseline, f has to show in what is left, and each of "
-    "its models has to be left out "
-    "without success, with as many runs as a candidate without f takes. The mark (◂) shows the "
-    "fewest tests."
+    "Ranked by the ratio of tests to the bound (geometric mean over the scenarios); a method that "
+    "is not certified with every seed is not ranked. No search needs fewer tests: after the "
+    "baseline, f has to show in what is left, and each of its models has to be left out without "
+    "success, with as many runs as a candidate without f takes. The mark (◂) shows the fewest "
+    "tests."
 )
 
 

@@ -89,10 +89,9 @@ def _elsewhere(ends: EndsElsewhere) -> str:
     """That what is left mostly ends where f did not, within epsilon of it."""
     return (
         "what is left may show another failure within epsilon: of the runs of the whole world "
-        "with f "
-        f"{ends.whole} of {ends.of_whole} ended in one place, of what is left {ends.left} of "
-        f"{ends.of_left} did, "
-        f"and others ended {ends.apart:.2g} m away; --epsilon {ends.epsilon:g} tells them apart"
+        f"with f {ends.whole} of {ends.of_whole} ended in one place, of what is left {ends.left} "
+        f"of {ends.of_left} did, and others ended {ends.apart:.2g} m away; --epsilon "
+        f"{ends.epsilon:g} tells them apart"
     )
 
 
@@ -503,8 +502,7 @@ def promise(state: RunState, certificate: Certificate) -> str:
     if certificate.seeds:
         return (
             "minimal means: for the chosen seeds this is exact, since a seed repeats its run "
-            "exactly; for other seeds, fresh "
-            "runs measure how often f shows, and nothing more"
+            "exactly; for other seeds, fresh runs measure how often f shows, and nothing more"
         )
     kept = f"{percent_at_least(_kept(certificate))} of {_whole_rate(certificate)}"
     pinned = never_left_out(state, certificate)

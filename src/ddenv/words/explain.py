@@ -289,8 +289,8 @@ def _baseline_so_far(state: RunState, options: Settings) -> Sentences:
     if options.reduces_one_run:
         times = f"twice, or {times} if these two runs differ"
     first = (
-        f"The robot runs in the whole world {times}, each with its own seed. f is the "
-        "failure that most runs end in: only worlds that show it are kept."
+        f"The robot runs in the whole world {times}, each with its own seed. f is the failure "
+        "that most runs end in: only worlds that show it are kept."
     )
     if any(test.run >= options.baseline_runs for test in state.tests):
         first = (

@@ -60,9 +60,8 @@ def refuted_words(state: RunState) -> str:
         return ""
     audit, source = state.refuted
     return (
-        f"test {audit} does not repeat test {source}, which implied it: slices are no longer "
-        "used in this run, and all that relied "
-        "on them is tested again"
+        f"test {audit} does not repeat test {source}, which implied it: slices are no longer used "
+        "in this run, and all that relied on them is tested again"
     )
 
 

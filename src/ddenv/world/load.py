@@ -168,8 +168,7 @@ def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
             key,
             (
                 f"{found} is not allowed{nearest(str(error['input']), allowed.split(', '))}; use "
-                "one "
-                f"of {allowed}"
+                f"one of {allowed}"
             ),
         )
     if kind == "string_pattern_mismatch" and key == "controller.use":

@@ -247,8 +247,7 @@ def notes_on_start(
             "wheels",
             (
                 "no wheel touches anything: the robot stands on its body, its wheels "
-                f"{hanging:.2f} "
-                "m above the ground"
+                f"{hanging:.2f} m above the ground"
             ),
         )
     if goal is not None:

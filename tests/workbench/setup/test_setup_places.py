@@ -216,8 +216,7 @@ async def test_models_inside_each_other_are_told_of_a_world_without_a_start(scen
             session,
             (
                 "▲ lower the spawn's z (+1): the robot starts 1.87 m above the surface below it "
-                "and "
-                "drops"
+                "and drops"
             ),
         )
         assert why in line.tooltip.plain

@@ -110,7 +110,7 @@ def test_textual_draws_what_is_of_an_unknown_kind_or_made_in_another_way():
 
 # The contract with Textual's compositor, which is not public. If a release of Textual breaks it,
 # the workbench still works, since Textual then draws by itself, but it sends more: read
-# `textual/_compositor.py` and mend `terminal/written.py`.
+# `textual/_compositor.py` and mend `terminal/cell_diff.py`.
 
 
 @pytest.fixture
@@ -133,7 +133,7 @@ async def updates(run, monkeypatch):
 
 async def test_the_terminal_shows_what_textual_itself_would_show(updates):
     assert callable(getattr(App, "_display", None)), (
-        "App._display is gone: nothing goes through written.py any more"
+        "App._display is gone: nothing goes through cell_diff.py any more"
     )
     assert {type(update) for update in updates} == {LayoutUpdate, ChopsUpdate}
     assert all(isinstance(update, CompositorUpdate) for update in updates)

@@ -77,8 +77,7 @@ class Link:
             self._end()
             raise UserError(
                 f"{cluster}: no Dask scheduler can be used there ({reason_of(error)}); start it, "
-                "or run the tests on this "
-                "machine with --cluster here"
+                "or run the tests on this machine with --cluster here"
             ) from None
         self._thread = threading.Thread(target=self._follow, daemon=True)
         self._thread.start()

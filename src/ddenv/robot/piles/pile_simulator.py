@@ -170,7 +170,7 @@ class PileSimulator:
             self._to_robot = gaps(robot, here, links, there)[0]
 
     def learn(self, present: frozenset[str]) -> None:
-        """Lets the repertoire know the piles of the whole world, with the models `present`, which
+        """Lets the cache know the piles of the whole world, with the models `present`, which
         this plant has.
         """
         if self._pile_cache.usual is None:

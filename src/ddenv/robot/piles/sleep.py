@@ -1,10 +1,10 @@
 """Which moving models are simulated: those that the robot or something that moves reaches.
 
 All others lie where they are as part of the ground (`Twins`), or are played back from a script
-(`rehearsal.py`): they cost little, do not creep, and change no bit of what does not touch them. So
-removing a model that takes no part leaves every bit of a run as it was. A model at rest wakes by
-itself, not with its neighbours: by a robot that comes close, by what presses on it, by a support
-that goes.
+(`pile_simulator.py`): they cost little, do not creep, and change no bit of what does not touch
+them. So removing a model that does not affect a run leaves every bit of a run as it was. A model at
+rest wakes by itself, not with its neighbours: by a robot that comes close, by what presses on it,
+by a support that goes.
 """
 
 from __future__ import annotations

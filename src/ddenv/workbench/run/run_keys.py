@@ -59,8 +59,7 @@ _GUIDES = (
         "accept",
         (
             "accept the reduction that waits, or adopt a try that shows f, or count another "
-            "failure "
-            "as f"
+            "failure as f"
         ),
     ),
     ("x", "reject", "reject", "reject the reduction that waits, and go on with the round"),

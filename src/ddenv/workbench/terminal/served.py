@@ -70,8 +70,7 @@ def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None
             lines = (
                 f"The workbench is at http://{HOST}:{port}/{token}/{size} (ctrl+c ends it).",
                 f"Anyone with that address acts as {user} on this machine: the workbench can "
-                "read, write and start "
-                "programs in your name.",
+                "read, write and start programs in your name.",
                 "Other machines cannot reach it. From yours, type there first:",
                 f"  ssh -L {port}:{HOST}:{port} {user}@{socket.gethostname()}",
             )

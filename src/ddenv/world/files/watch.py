@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-# Is told again and again, in words, how far it is: "" while it has not taken long, and at its end.
-# What it raises ends the cutting.
+# Called several times a second with words that say how far the cutting is: "" in its first second
+# and at its end. An exception that it raises ends the cutting.
 Watch = Callable[[str], object]
 # The one of this thread.
 WATCH: ContextVar[Watch] = ContextVar("WATCH", default=lambda words: None)
@@ -15,7 +15,7 @@ WATCH: ContextVar[Watch] = ContextVar("WATCH", default=lambda words: None)
 
 @contextmanager
 def watched(watch: Watch) -> Iterator[None]:
-    """Lets `watch` know while this thread waits."""
+    """Calls `watch` while this thread cuts meshes."""
     token = WATCH.set(watch)
     try:
         yield

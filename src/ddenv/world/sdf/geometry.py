@@ -330,9 +330,9 @@ def remedies(lost: Lost, siblings: Names) -> str:
     folder = "" if lost.unreadable else "its folder with --model-path, "
     return (
         f"{lost.element.tag} '{lost.uri[:200]}' {lost.problem}: {lost.reason}; give {folder}a "
-        "shape in m with "
-        f"--stand-in '{package[:200]}=cylinder:0.3,1.0' (radius, length; or {others}){also}, "
-        f"have one guessed with --stand-in auto, or leave it out with --ignore {lost.element.tag}"
+        f"shape in m with --stand-in '{package[:200]}=cylinder:0.3,1.0' (radius, length; or "
+        f"{others}){also}, have one guessed with --stand-in auto, or leave it out with --ignore "
+        f"{lost.element.tag}"
     )
 
 

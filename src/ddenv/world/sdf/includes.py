@@ -143,8 +143,8 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
         folder = "its folder with --model-path, " if is_missing else ""
         remedies = (
             f"give {folder}a shape for it with --stand-in '{uri[:200]}=box:1,1,1' (m; or "
-            "cylinder, sphere, ...), "
-            "have one guessed with --stand-in auto, or leave it out with --ignore include"
+            "cylinder, sphere, ...), have one guessed with --stand-in auto, or leave it out with "
+            "--ignore include"
         )
         if not is_missing:
             context.unreadable[uri] = str(error)

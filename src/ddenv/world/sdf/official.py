@@ -31,12 +31,10 @@ FRAMES = ("model", "link", "joint", "frame", "include")
 INCLUDABLE = ("model", "actor", "light")
 SENSORS = (
     "air_pressure altimeter boundingbox boundingbox_camera camera contact custom depth "
-    "depth_camera force_torque gps "
-    "gpu_lidar gpu_ray imu lidar logical_camera magnetometer multicamera navsat ray rfid rfidtag "
-    "rgbd rgbd_camera "
-    "segmentation segmentation_camera sonar thermal thermal_camera wide_angle_camera "
-    "wideanglecamera "
-    "wireless_receiver wireless_transmitter"
+    "depth_camera force_torque gps gpu_lidar gpu_ray imu lidar logical_camera magnetometer "
+    "multicamera navsat ray rfid rfidtag rgbd rgbd_camera segmentation segmentation_camera sonar "
+    "thermal thermal_camera wide_angle_camera wideanglecamera wireless_receiver "
+    "wireless_transmitter"
 )
 TYPES = {"light": frozenset(["point", "spot", "directional"]), "sensor": frozenset(SENSORS.split())}
 Refusal = tuple[str, Element]
